@@ -158,7 +158,7 @@ def redraw(
     for name in ("found", "true", "told"):
         at = folder / f"{name}.yaml"
         tracked = scenario_from_recording(at, scans, folder / "truth.csv", speed=scene.speed).scenario
-        scores.append(float(np.nanmean(run_scenario(tracked, "still", seed=0).ospa[:, 0])))
+        scores.append(float(np.nanmean(run_scenario(tracked, "stationary", seed=0).ospa[:, 0])))
     return Redraw(calibration, (scores[0], scores[1], scores[2]), spent, passes[0])
 
 

@@ -32,7 +32,7 @@ PERIODS = (5.0, 7.0, 9.0)  # s
 SECONDS, HALF_SIDE = 300.0, 6000.0  # of a recording; m, of clutter
 STDS, DETECTED = (20.0, 0.012), 0.9  # m, rad
 TOLD = """recording: {bearings: north}
-motion: {kind: constant_velocity, sigma_v: 0.05, acceleration: continuous}
+motion: {kind: constant_velocity, sigma_v: 0.05, noise_model: continuous_white}
 sensor_defaults:
   measurement: {kind: bearing_range}
   noise: {kind: range_dependent, sigma_range: 30, eta_range: 0.0, sigma_bearing_deg: 1.0, eta_bearing: 0.0}

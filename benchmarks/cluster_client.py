@@ -37,7 +37,7 @@ SECONDS = float(os.environ.get("STUB_SECONDS", "0.2"))
 @cache
 def finished_run() -> tuple[bytes, bytes, bytes]:
     """What is handed back of a run."""
-    changes = {"time.num_steps": 40, "control.decision_steps": [9], "ospa.to_step": 40}
+    changes = {"time.num_steps": 40, "control.decision_steps": [9], "ospa.last_scan": 40}
     campaign = resolve(
         spec_from_data({"name": "one", "scenarios": ["paper-a"], "planners": ["idm"], "runs": 1, "set": changes})
     )
@@ -67,7 +67,7 @@ def main() -> None:
     scheduler = [*dask, "scheduler", "--host", "127.0.0.1", "--port", str(port), "--no-dashboard"]
     worker = [*dask, "worker", address, "--nthreads", str(options.threads), "--no-dashboard", "--no-nanny"]
     processes = [subprocess.Popen(each, env=environment, **quiet) for each in (scheduler, worker)]
-    spec = {"name": "bench", "scenarios": ["paper-a"], "planners": ["idm", "still"], "runs": options.runs}
+    spec = {"name": "bench", "scenarios": ["paper-a"], "planners": ["idm", "stationary"], "runs": options.runs}
     campaign = replace(resolve(spec_from_data(spec)), shard=Shard(1, 2))  # of which no tables are written
     from cluster_client import stub as by_name  # as workers find it
 

@@ -44,7 +44,7 @@ from vedette.scenarios.build import build_experiment, build_planner
 from vedette.simulation import simulate
 
 SEED, FIRST, FLOOR, LEVEL = 0, "jdm loss", "true targets", 0.05
-BEFORE = ("random", "fixed")
+BEFORE = ("random", "constant")
 LEAST_GAP = 0.02  # m, between a rule of thumb and the floor: below it there is nothing to score
 COLUMNS = (FLOOR, "oracle 1", "idm stay", "best rule")
 REST = ("lost (m)", "score", "short", "ms", "runs")
@@ -79,8 +79,8 @@ def score(scene_name: str, strategy: str, run: int) -> Score:
     timed = Timed(planner)
     ospa_of = partial(ospa_of_run, cutoff=ospa.cutoff, order=ospa.order, components=ospa.components)
     record = simulate(build_experiment(scenario), timed, seed=SEED, run=run, score=ospa_of)
-    first = ospa.from_step or (scenario.model.decision_steps[0] + 1 if scenario.model.decision_steps else 1)
-    scored = slice(first - 1, ospa.to_step)
+    first = ospa.first_scan or (scenario.model.decision_steps[0] + 1 if scenario.model.decision_steps else 1)
+    scored = slice(first - 1, ospa.last_scan)
     total, _, lost = record.ospa[scored].mean(axis=0).tolist()
     short = float(np.mean(timed.short)) if timed.short else np.nan
     missed = match_run(record.truth, record.estimates, cutoff=ospa.cutoff, order=ospa.order).num_missed[scored]

@@ -41,7 +41,7 @@ REWARDS: dict[str, Fields] = {
     "cs": {"kind": "cauchy_schwarz"},
     "cs-k": {"kind": "cauchy_schwarz", "unit_volume": "reference"},
 }
-RULES = ("nearest", "assigned", "centroid")
+RULES = ("nearest", "assigned_target", "centroid")
 DEPTHS = (2, 3)
 
 
@@ -84,10 +84,10 @@ def strategies(scenario: Scenario) -> dict[str, Fields]:
     if len(scenario.model.sensors) == 2:
         for pair in product((1, 2, 3, 4), repeat=2):
             if pair[0] != pair[1]:
-                found[f"pair {pair[0]} {pair[1]}"] = {"kind": "assigned", "targets": list(pair)}
+                found[f"pair {pair[0]} {pair[1]}"] = {"kind": "assigned_target", "targets": list(pair)}
     for depth in (1, 2):
         found[f"oracle {depth}"] = {"kind": "oracle", "depth": depth}
-    found["true targets"] = {"kind": "told", "reward": loss}
+    found["true targets"] = {"kind": "true_targets", "reward": loss}
     return found
 
 

@@ -113,7 +113,7 @@ def _scored(scenario: Scenario) -> slice:
     """The scans over which the scenario takes its mean."""
     ospa, decisions = scenario.model.ospa, scenario.model.decision_steps
     after = decisions[0] + 1 if decisions else 1
-    return slice((ospa.from_step or after) - 1, ospa.to_step)
+    return slice((ospa.first_scan or after) - 1, ospa.last_scan)
 
 
 class Ratio(NamedTuple):

@@ -27,7 +27,7 @@ from vedette.simulation import simulate_scan
 REACH, SPEED, NUM_SCANS, CLUTTER, SIGMA_V = 500.0, 10.0, 20, 5.0, 1.0
 DETECTIONS = {
     "range": models.limited_range(0.95, REACH),
-    "soft": models.soft_sector(0.95, REACH, range_slope=0.5, cut=True),
+    "soft": models.soft_sector(0.95, REACH, range_slope=0.5, hard_limit=True),
 }
 REGION, POSE = models.Region(-700.0, 700.0, -700.0, 700.0), np.zeros(3)
 

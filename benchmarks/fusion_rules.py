@@ -48,9 +48,11 @@ def rules() -> dict[str, Callable[[], object]]:
     return {
         "parallel update": lambda: ParallelUpdate().fuse(posteriors, views),
         "GCI": lambda: Clmb(equal).fuse(posteriors, views),
-        "GCI by views": lambda: Clmb(equal, by_views=True).fuse(posteriors, views),
+        "GCI by views": lambda: Clmb(equal, field_of_view_weighting=True).fuse(posteriors, views),
         "arithmetic average": lambda: ArithmeticAverage(equal).fuse(posteriors, views),
-        "arithmetic average by views": lambda: ArithmeticAverage(equal, by_views=True).fuse(posteriors, views),
+        "arithmetic average by views": lambda: ArithmeticAverage(equal, field_of_view_weighting=True).fuse(
+            posteriors, views
+        ),
         "matching of labels": lambda: match_labels(others),
     }
 

@@ -110,7 +110,7 @@ def scene(number: int, kind: str, gap: int) -> tuple[Scene, np.random.Generator]
     )
     born = models.MeasurementBirth(0.5, 0.03, np.array([2.0 * across, 2.0 * across, SPEED, SPEED]), region)
     birth = models.BirthModel(np.empty(0), np.empty((0, 4)), np.empty((0, 4, 4)), from_measurements=born)
-    motion = models.constant_velocity(SPEED / 20.0, acceleration="continuous")
+    motion = models.constant_velocity(SPEED / 20.0, noise_model="continuous_white")
     targets = models.TargetModel(motion, models.constant_survival(0.999, period=1.0), birth)
     times = period * np.arange(NUM_SCANS)
     return Scene(targets, sensor, times, states, there, hidden, np.array(stds), prob_detection, clutter), rng

@@ -6,8 +6,9 @@
 
 Two to four sensors see 80, 120 or 180 m in a square of 600, 900 or 1,200 m, and decide after every scan, every second
 or every fifth. Two to four targets are there at first; in three of four scenes four to eight more are born later,
-anywhere. Each scene is run with search and a learnt birth rate, as is the default, and without (`undetected_worth: 0`,
-the rate as promised). The table has the mean OSPA (cutoff 50 m, order 1) over scans and runs, its paired difference
+anywhere. Each scene is run with search and a learnt birth rate, as is the default, and without
+(`undetected_target_value: 0`, the rate as promised). The table has the mean OSPA (cutoff 50 m, order 1) over scans and
+runs, its paired difference
 with one standard error (negative: search is better), the seconds until a late target is first tracked (`TimeToTrack`),
 and CPU seconds of a run, without search and with it.
 """
@@ -50,7 +51,7 @@ def scene(number: int, searches: bool) -> Scenario:
     view, speed, every = (float(rng.choice(of)) for of in ([80.0, 120.0, 180.0], [10.0, 20.0], [1, 2, 5]))
     early, late = int(rng.integers(2, 5)), int(rng.integers(4, 9)) if number % 4 else 0
     sensor = {
-        "platform": {"kind": "courses", "speed": speed, "headings_deg": [-90, -45, 0, 45, 90], "relative": True},
+        "platform": {"kind": "heading", "speed": speed, "headings_deg": [-90, -45, 0, 45, 90], "relative": True},
         "measurement": {"kind": "position"},
         "noise": {"kind": "constant", "std": [4.0, 4.0]},
         "detection": {"kind": "limited_range", "probability": 0.95, "max_range": view},
@@ -78,7 +79,7 @@ def scene(number: int, searches: bool) -> Scenario:
         "ospa": {"cutoff": CUTOFF, "order": 1.0},
     }
     if not searches:
-        data["control"]["undetected_worth"] = 0.0  # type: ignore[index]
+        data["control"]["undetected_target_value"] = 0.0  # type: ignore[index]
     return Scenario(parse_scenario(yaml.safe_dump(data)), Path(f"late-births-{number}.yaml"))
 
 

@@ -122,10 +122,10 @@ def strategies(scene: str) -> tuple[Strategy, ...]:
     directions = load_scenario(scene).model.sensors[0].platform.model_dump()["directions_deg"]
     rows = [Strategy("depth 1", "jdm", {})]
     for num in FINE:
-        many = {"kind": "steps", "length": STEPS[scene], "speed": STEPS[scene], "directions_deg": around(num)}
+        many = {"kind": "grid_moves", "length": STEPS[scene], "speed": STEPS[scene], "directions_deg": around(num)}
         rows.append(Strategy(f"depth 1, {num} directions", "jdm", {"sensors.*.platform": many}))
     for headings in (directions, *map(around, FINE)):
-        kept = {"kind": "courses", "speeds": [STEPS[scene], 0.0], "headings_deg": list(headings)}
+        kept = {"kind": "heading", "speeds": [STEPS[scene], 0.0], "headings_deg": list(headings)}
         fields = {"sensors.*.platform": kept, "control.horizon_steps": DEEPEST}
         rows.append(Strategy(f"kept {DEEPEST} s, {len(headings)} directions", "jdm", fields))
     rows.append(Strategy("depth 3, defaults", "lookahead", {"control.lookahead": None}))
@@ -155,7 +155,7 @@ def score(scene: str, strategy: Strategy, run: int, seed: int) -> Score:
     timed = Timed(planner)
     ospa_of = partial(ospa_of_run, cutoff=ospa.cutoff, order=ospa.order, components=ospa.components)
     record = simulate(build_experiment(scenario), timed, seed=seed, run=run, score=ospa_of)
-    window = slice(ospa.from_step - 1, ospa.to_step)
+    window = slice(ospa.first_scan - 1, ospa.last_scan)
     measures = measure_run(record, scenario)
     return Score(
         ospa=float(record.ospa[window, 0].mean()),

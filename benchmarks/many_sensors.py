@@ -53,7 +53,7 @@ def decision(sensors: int, targets: int, actions: int, samples: int, steps: int,
     model = models.SensorModel(
         models.bearing_range(),
         models.range_dependent_noise(5.0, 5e-5, 0.02, 2e-5),
-        models.soft_sector(0.95, reach, range_slope=0.05, cut=True),
+        models.soft_sector(0.95, reach, range_slope=0.05, hard_limit=True),
         models.region_clutter(5.0, region, "bearing_range"),
     )
     known = models.TargetModel(models.constant_velocity(1.0), models.constant_survival(0.99), models.BirthModel.none(4))

@@ -26,7 +26,7 @@ from vedette.internal.text import named_in
 
 CAMPAIGNS = Path(__file__).parents[1] / "examples/campaigns"
 STAGES = ("filter", "fusion")
-TRACKED = "tracked_share"  # as the scenes name the measure
+TRACKED = "tracked_fraction"  # as the scenes name the measure
 
 
 def table(results: CampaignResults, group: GroupComparison) -> Iterator[str]:

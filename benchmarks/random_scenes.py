@@ -36,7 +36,11 @@ def random_scene(number: int) -> Scene:
     fields: Fields = {
         "time.num_steps": num_steps,
         "time.step_period": 1.0 / rate,
-        "motion": {"kind": "constant_velocity", "sigma_v": float(rng.uniform(0.5, 4.0)), "acceleration": "continuous"},
+        "motion": {
+            "kind": "constant_velocity",
+            "sigma_v": float(rng.uniform(0.5, 4.0)),
+            "noise_model": "continuous_white",
+        },
         "survival": {"kind": "constant", "probability": survival, **period},
         "sensors": [_sensor(s, num_sensors, rng) for s in range(num_sensors)],
         **BIRTHS[kind](rng, num_steps / rate if per_second else float(num_steps)),

@@ -33,7 +33,7 @@ from vedette.evaluation.runs import measure_run, run_scenario
 from vedette.internal.reading import read_members
 from vedette.simulation.serialization import encode_timings
 
-PLANNERS = ("jdm", "idm", "assigned", "random")
+PLANNERS = ("jdm", "idm", "assigned_target", "random")
 
 
 def renumbered(payload: bytes, run: int) -> bytes:

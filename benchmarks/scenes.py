@@ -60,7 +60,7 @@ class Scene:
 
     name: str
     scenario: Callable[[int], Scenario]
-    planner: str = "still"
+    planner: str = "stationary"
     share: float = 1.0
 
 
@@ -90,7 +90,7 @@ def track(state: Sequence[float], start: int = 1) -> Any:
 def two_names() -> Iterator[Scene]:
     """One target that may have been missed at its first scan and be named by its second: scored from scan 10 on."""
     drawn = {"state": [0.0] * 4, "std": [20.0, 20.0, 5.0, 5.0], "process_noise": True}
-    fields = {"time.num_steps": 20, "targets.tracks": [drawn], "ospa.from_step": 10}
+    fields = {"time.num_steps": 20, "targets.tracks": [drawn], "ospa.first_scan": 10}
     own_tracks = {"kind": "cm_delta_glmb"}
     yield own("two names, GCI", fields, 2, own_tracks)
     yield own("two names, GCI, noise 4 m", {**fields, "sensors.*.noise.std": [4.0, 4.0]}, 2, own_tracks)
@@ -202,14 +202,14 @@ def all_scenes() -> tuple[Scene, ...]:
         *two_names(),
         *close_targets(),
         *crossing_targets(),
-        builtin("linear-10", "still", 0.25),
-        builtin("polar-10", "still", 0.25),
+        builtin("linear-10", "stationary", 0.25),
+        builtin("polar-10", "stationary", 0.25),
         builtin("paper-a", "jdm"),
-        builtin("paper-e", "fixed"),
+        builtin("paper-e", "constant"),
         builtin("paper-e", "jdm"),
         still_sensors(),
-        builtin("three-positions", "still", 0.25, fusion={"kind": "sequential"}),
-        builtin("shore-radar", "still", 0.5),
+        builtin("three-positions", "stationary", 0.25, fusion={"kind": "sequential"}),
+        builtin("shore-radar", "stationary", 0.5),
         builtin("six-cameras", "jdm", 0.5),
         builtin("eight-mobile", "jdm", 0.25),
         *many(),

@@ -147,7 +147,7 @@ def compared(problem: JointProblem, rng: np.random.Generator) -> Iterator[tuple[
     """Every way with what it found and evaluated."""
     if math.prod(problem.shape) <= SMALL:
         yield "exhaustive", *searched(ExhaustiveSearch(), problem, rng)
-    for order in ("printed", "best_first"):
+    for order in ("sensor_order", "best_first"):
         yield f"greedy, {order}", *searched(SequentialGreedy(order), problem, rng)
     yield "ascent", *searched(CoordinateAscent(0), problem, rng)
     for restarts in (2, 8):

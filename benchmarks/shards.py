@@ -40,11 +40,11 @@ from vedette.simulation.serialization import encode_timings
 SPEC = """
 name = "bench"
 scenarios = ["paper-a"]
-planners = ["idm", "still"]
+planners = ["idm", "stationary"]
 runs = {runs}
 set."time.num_steps" = {scans}
 set."control.decision_steps" = [9]
-set."ospa.to_step" = {scans}
+set."ospa.last_scan" = {scans}
 """
 # The program, with runs that are stubs where there is a file of one, beside which it says what it took until the first.
 PROGRAM = """

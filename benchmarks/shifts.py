@@ -112,7 +112,7 @@ def measured(scenario: Scenario, choice: str, share: int, run: int) -> tuple[flo
     score = partial(ospa_of_run, cutoff=ospa.cutoff, order=ospa.order, components=ospa.components)
     planner = Shifts(build_planner(scenario, "jdm", 1), share / 100.0, choice, np.random.default_rng([SEED, run]))
     record = simulate(experiment, planner, seed=SEED, run=run, score=score)
-    first, last = (ospa.from_step or 1) - 1, ospa.to_step or scenario.model.time.num_steps
+    first, last = (ospa.first_scan or 1) - 1, ospa.last_scan or scenario.model.time.num_steps
     scanned = ~record.off[scenario.model.decision_steps[0] :]
     return float(np.nanmean(record.ospa[first:last, 0])), 100.0 * float(scanned.mean())
 

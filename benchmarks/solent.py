@@ -62,7 +62,7 @@ TOLD_NOISE: Data = {
 TOLD_PROBABILITY, TOLD_RATE = 0.8, 8.0
 WORDS = {"range": "range, m", "bearing_deg": "bearing, degrees", "clock": "clock, s"}
 WORDS |= {"sigma_range": "range, m", "sigma_bearing_deg": "bearing, degrees"}
-STRATEGIES = ("jdm", "idm", "nearest", "assigned", "centroid", "random", "fixed", "oracle", "told")
+STRATEGIES = ("jdm", "idm", "nearest", "assigned_target", "centroid", "random", "constant", "oracle", "true_targets")
 RECORDED = 600.0  # s
 PEER = Path(__file__).with_name("solent_peer.py").resolve()
 SEED = 5
@@ -86,7 +86,7 @@ def in_truth(data: Data, sensors: list[Data]) -> list[Data]:
     """Sensors that are as the scene has them, biases added, whatever filters know of them."""
     parts = ("noise", "detection", "clutter")
     return [
-        {**known, "truth": {**{part: own[part] for part in parts}, "bias": BIASES[own["name"]]}}
+        {**known, "true_parameters": {**{part: own[part] for part in parts}, "bias": BIASES[own["name"]]}}
         for own, known in zip(data["sensors"], sensors, strict=True)
     ]
 
@@ -128,7 +128,7 @@ def write_scene(data: Data, beside: Path, folder: Path, runs: int) -> None:
         "as assumed": told(data),
     }
     scene = {**data, "name": "solent", "sensors": in_truth(data, sensors["calibrated"])}
-    scene["ospa"] = {**data["ospa"], "from_step": 1 + round(FROM_TIME / data["time"]["step_period"])}
+    scene["ospa"] = {**data["ospa"], "first_scan": 1 + round(FROM_TIME / data["time"]["step_period"])}
     (folder / "scene.yaml").write_text(dump_data(scene, beside), "utf-8")
     head = f'scenarios = ["scene.yaml"]\nruns = {runs}\n'
     planners = ", ".join(f'"{name}"' for name in STRATEGIES)
@@ -204,7 +204,7 @@ def table_of(folder: Path, name: str) -> Iterator[str]:
     yield f"| {'radars' if name == 'biases' else 'strategy'} | OSPA (m) | more (m) | in sight and tracked |"
     yield "| --- | ---: | ---: | ---: |"
     for label in group.labels:
-        total, tracked = comparison.summary(label), comparison.summary(label, "tracked_share")
+        total, tracked = comparison.summary(label), comparison.summary(label, "tracked_fraction")
         more = None if label == first else comparison.difference(label, first).summary
         cells = [label, f"{total.mean:.2f} ± {total.standard_error:.2f}"]
         cells += ["" if more is None else f"{more.mean:+.2f} ± {more.standard_error:.2f}", f"{tracked.mean:.1%}"]
@@ -250,7 +250,7 @@ def write_peer_scans(
 def counted(record: RunRecord, found: Sequence[Any], scenario: Scenario) -> float:
     """Mean OSPA, m, of the steps that count."""
     section, distances = scenario.model.ospa, []
-    for k in range(section.from_step - 1, record.num_scans):
+    for k in range(section.first_scan - 1, record.num_scans):
         places = found[k] if isinstance(found[k], np.ndarray) else found[k].means[:, :2]
         true = record.truth.at(k)[1][:, :2]
         distances.append(ospa(places, true, cutoff=section.cutoff, order=section.order).total)

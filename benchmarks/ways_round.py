@@ -74,7 +74,7 @@ def scenario_of(scene: str, run: int) -> Scenario:
         "time.num_steps": STEPS,
         "birth.sites": [{"existence": 0.9, "mean": own, "std": [10.0, 10.0, 1.0, 1.0]} for own in states],
         "targets.tracks": [{"state": own, "process_noise": True} for own in states],
-        "sensors.*.platform": {"kind": "steps", "length": STEP, "speed": STEP},
+        "sensors.*.platform": {"kind": "grid_moves", "length": STEP, "speed": STEP},
         **{f"sensors.{s}.position": own for s, own in enumerate(sensors.tolist())},
         "control.constraints": SCENES[scene],
     }

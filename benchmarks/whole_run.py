@@ -30,7 +30,7 @@ _FIRST_SCAN = (
     "model = scenario.model\n"
     "short = model.model_copy(update={'time': model.time.model_copy(update={'num_steps': 1}),\n"
     "    'control': model.control.model_copy(update={'decision_steps': ()})})\n"
-    "run_scenario(replace(scenario, model=short), 'still', seed=0, num_threads=1)\n"
+    "run_scenario(replace(scenario, model=short), 'stationary', seed=0, num_threads=1)\n"
 )
 
 

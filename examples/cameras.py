@@ -19,7 +19,7 @@ SCENARIO = load_scenario("six-cameras")
 
 def main() -> dict[str, RunRecord]:
     records = {
-        planner: run_scenario(SCENARIO, planner, seed=1, num_threads=1) for planner in ("still", "random", "jdm")
+        planner: run_scenario(SCENARIO, planner, seed=1, num_threads=1) for planner in ("stationary", "random", "jdm")
     }
     for planner, record in records.items():
         tracked = measure_run(record, SCENARIO, custom_metrics(SCENARIO)).custom["tracked_of_all"]
@@ -30,7 +30,7 @@ def main() -> dict[str, RunRecord]:
 def draw(records: dict[str, RunRecord]):
     from vedette.evaluation.figures import build_scene, tracks_figure
 
-    shown = [records["still"], records["jdm"]]
+    shown = [records["stationary"], records["jdm"]]
     return tracks_figure(*shown, titles=["Never turned", "Turned jointly"], scene=build_scene(SCENARIO, "jdm"))
 
 

@@ -25,7 +25,7 @@ KEPT = Path(__file__).with_name("gym_policy.npz")
 TOLD, HIDDEN = 6, 8
 LABELS = 30  # targets that the policy is shown
 REACH = 100.0  # m, in which it measures distances: what the sensors of eight-mobile see
-STRATEGIES = ("jdm", "policy", "idm", "assigned", "nearest", "centroid", "random")
+STRATEGIES = ("jdm", "policy", "idm", "assigned_target", "nearest", "centroid", "random")
 SEED, RUNS = 1, 3  # of the comparison; trained on seed 1000
 
 

@@ -32,7 +32,7 @@ def main() -> dict[str, RunRecord]:
         file.write_text(scene_text(GeneratedScene(num_sensors=100, decide_every=5)), "utf-8")
         scenario = replace_fields(load_scenario(file), SHORTER)
     records = {}
-    for planner in ("still", "nearest", "jdm"):
+    for planner in ("stationary", "nearest", "jdm"):
         record = records[planner] = run_scenario(scenario, planner, seed=1, num_threads=1)
         print(f"{planner:8} OSPA {record.ospa[:, 0].mean():5.1f} m, at the end {record.ospa[-1, 0]:5.1f} m")
     plan = records["jdm"].decisions[0].plan
@@ -52,7 +52,7 @@ def draw(records: dict[str, RunRecord]):
         )
         left.plot(*record.poses[-1, s, :2], "C0s", markersize=2)
     legend_above(left)
-    names = {"still": "not moving", "nearest": "each to its nearest target", "jdm": "joint decisions"}
+    names = {"stationary": "not moving", "nearest": "each to its nearest target", "jdm": "joint decisions"}
     draw_errors(right, record.times, {names[name]: own.ospa[:, 0] for name, own in records.items()}, "OSPA (m)")
     for decision in record.decisions:
         right.axvline(decision.time, color="0.8", zorder=0)

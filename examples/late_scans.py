@@ -35,7 +35,7 @@ def make_tracker() -> Central:
     )
     birth = models.BirthModel([0.5], [[600.0, 0.0, 0.0, 0.0]], [np.diag([100.0, 100.0, 15.0, 15.0]) ** 2], {1})
     survival = models.constant_survival(0.999, period=1.0)
-    targets = models.TargetModel(models.constant_velocity(0.5, acceleration="continuous"), survival, birth)
+    targets = models.TargetModel(models.constant_velocity(0.5, noise_model="continuous_white"), survival, birth)
     return Central(SequentialLmbFilter(targets, (radar, radar)))
 
 

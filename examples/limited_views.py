@@ -17,7 +17,7 @@ from vedette.simulation import RunRecord
 SCENARIO = load_scenario("two-views-1")
 FUSIONS = {
     "all the same view": {"kind": "clmb", "matching": "assignment"},
-    "by views": {"kind": "clmb", "matching": "assignment", "by_views": True},
+    "by views": {"kind": "clmb", "matching": "assignment", "field_of_view_weighting": True},
     "scans in turn": {"kind": "sequential"},
 }
 
@@ -26,8 +26,8 @@ def main() -> dict[str, RunRecord]:
     records = {}
     for name, fusion in FUSIONS.items():
         scenario = replace_fields(SCENARIO, {"fusion": fusion})
-        record = records[name] = run_scenario(scenario, "still", seed=1)
-        tracked = measure_run(record, scenario, custom_metrics(scenario)).custom["tracked_share"]
+        record = records[name] = run_scenario(scenario, "stationary", seed=1)
+        tracked = measure_run(record, scenario, custom_metrics(scenario)).custom["tracked_fraction"]
         error = record.ospa[:, 0].mean()
         print(f"{name:18} OSPA {error:5.1f} m, of the targets in sight tracked {np.nanmean(tracked):4.0%}")
     return records
@@ -38,7 +38,7 @@ def draw(records: dict[str, RunRecord]):
 
     shown = list(FUSIONS)[:2]
     titles = [f"Covariance intersection, {name}" for name in shown]
-    return tracks_figure(*(records[name] for name in shown), titles=titles, scene=build_scene(SCENARIO, "still"))
+    return tracks_figure(*(records[name] for name in shown), titles=titles, scene=build_scene(SCENARIO, "stationary"))
 
 
 if __name__ == "__main__":

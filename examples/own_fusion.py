@@ -44,7 +44,7 @@ def main() -> tuple[np.ndarray, dict[str, np.ndarray]]:
     for name, fusion in FUSIONS.items():
         parts = {"filter": {"kind": "lmb"}, "fusion": {**fusion, "feedback": True}}
         scenario = replace_fields(load_scenario("paper-a"), parts)
-        records = [run_scenario(scenario, "fixed", seed=1, run=run) for run in range(RUNS)]
+        records = [run_scenario(scenario, "constant", seed=1, run=run) for run in range(RUNS)]
         errors[name] = np.mean([record.ospa[:, 0] for record in records], axis=0)
         print(f"{name:24} OSPA {errors[name][10:].mean():5.1f} m")
     return records[0].times, errors

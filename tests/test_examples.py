@@ -58,7 +58,7 @@ SHOWN = {
     "docs/calibration.md": ["biases are found from 60.0 s on"],
     "docs/campaigns.md": ["paper-a"],
     "docs/central-filters.md": ["[[200.  50.]] "],
-    "docs/choosing.md": ["expected_loss: assigned has +"],
+    "docs/choosing.md": ["expected_loss: assigned_target has +"],
     "docs/coming-from.md": ["N = 1"],
     "docs/constraints.md": ["no target within 100 m: [0.0237"],
     "docs/control.md": ["+-", "filter_steps", "candidates left", "joint actions evaluated"],

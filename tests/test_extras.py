@@ -54,14 +54,14 @@ LIGHT = [
     ["check", "bay.yaml", "made.yaml", "crowd.yaml"],
     ["show", "bay.yaml"],
     ["schema"],
-    ["run", "linear-10", "--planner", "still"],
+    ["run", "linear-10", "--planner", "stationary"],
     ["live", "--sensors", "bay.yaml"],
     ["track", "scans.csv", "--sensors", "radars.yaml", "--out", "tracked"],
     ["calibrate", "scans.csv", "--sensors", "radars.yaml"],
 ]
 HEAVY = {
     ("show", "linear-10", "--out", "picture.png"): ("matplotlib", "report"),
-    ("run", "linear-10", "--planner", "still", "--out", "run"): ("matplotlib and pyarrow", "report"),
+    ("run", "linear-10", "--planner", "stationary", "--out", "run"): ("matplotlib and pyarrow", "report"),
     ("video", "there", "--out", "run.gif"): ("matplotlib and pyarrow", "report"),
     ("live", "--sensors", "bay.yaml", "--listen", "ws://127.0.0.1:0"): (
         "websockets and jinja2 and matplotlib and pyarrow",
@@ -151,7 +151,9 @@ def test_light_commands_need_no_extra(tmp_path: Path) -> None:
 
 
 def test_commands_that_need_an_extra_name_it_in_one_line(tmp_path: Path) -> None:
-    (tmp_path / "spec.toml").write_text('name = "trial"\nscenarios = ["linear-10"]\nplanners = ["still"]\nruns = 1\n')
+    (tmp_path / "spec.toml").write_text(
+        'name = "trial"\nscenarios = ["linear-10"]\nplanners = ["stationary"]\nruns = 1\n'
+    )
     (tmp_path / "there").mkdir()
     found = outcomes([list(command) for command in HEAVY], tmp_path)
     for (command, (names, extra)), (status, output, error, _) in zip(HEAVY.items(), found, strict=True):
@@ -194,7 +196,9 @@ def test_every_command_is_among_these() -> None:
 
 
 def test_only_a_scheduler_needs_the_extra_of_clusters(tmp_path: Path) -> None:
-    (tmp_path / "spec.toml").write_text('name = "trial"\nscenarios = ["linear-10"]\nplanners = ["still"]\nruns = 2\n')
+    (tmp_path / "spec.toml").write_text(
+        'name = "trial"\nscenarios = ["linear-10"]\nplanners = ["stationary"]\nruns = 2\n'
+    )
     command = ["campaign", "spec.toml"]
     found = outcomes(
         [[*command, "--scheduler", "tcp://127.0.0.1:1"], [*command, "--workers", "2"]],

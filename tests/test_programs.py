@@ -208,23 +208,23 @@ SAYS = "print(json.dumps({'estimates': %s}), flush=True)"
 
 def test_the_error_of_a_tracker_of_constants_is_the_one_by_hand(tmp_path: Path) -> None:
     told = "[{'state': [3.0, 4.0], 'label': 'a'}, {'state': [300.0, 0.0, 0.0, 0.0], 'label': 7, 'existence': 0.9}]"
-    record = run_scenario(tracked(section(tmp_path, ANSWERS.replace("ANSWER", SAYS % told))), "still", seed=0)
+    record = run_scenario(tracked(section(tmp_path, ANSWERS.replace("ANSWER", SAYS % told))), "stationary", seed=0)
     assert np.allclose(record.ospa[:, 0], (5.0 + 0.0) / 2.0)
     assert [estimate.labels.tolist() for estimate in record.estimates] == [[[1, 0], [1, 1]]] * 4
     alone = ANSWERS.replace("ANSWER", SAYS % "[{'state': [3.0, 4.0], 'cov': [[4.0, 0.0], [0.0, 1.0]]}]")
-    record = run_scenario(tracked(section(tmp_path, alone)), "still", seed=0)
+    record = run_scenario(tracked(section(tmp_path, alone)), "stationary", seed=0)
     assert np.allclose(record.ospa[:, 0], (5.0 + 10.0) / 2.0)
     assert [estimate.labels.tolist() for estimate in record.estimates] == [[[1, 0]]] * 4
     assert np.array_equal(record.estimates[0].covs[0, :2, :2], np.diag([4.0, 1.0]))
     none = ANSWERS.replace("ANSWER", SAYS % "[]")
-    assert np.allclose(run_scenario(tracked(section(tmp_path, none)), "still", seed=0).ospa[:, 0], 10.0)
+    assert np.allclose(run_scenario(tracked(section(tmp_path, none)), "stationary", seed=0).ospa[:, 0], 10.0)
 
 
 def test_a_tracker_is_told_every_scan_with_its_time_and_pose(tmp_path: Path) -> None:
     own = "[{'state': [told['time'], sum(len(scan['measurements']) for scan in told['scans'])]}]"
     silent = {"sensors.*.detection": {"kind": "constant", "probability": 0.0}, "sensors.*.clutter.rate": 0.0}
     scenario = tracked(section(tmp_path, ANSWERS.replace("ANSWER", SAYS % own)), **silent)
-    record = run_scenario(scenario, "still", seed=0)
+    record = run_scenario(scenario, "stationary", seed=0)
     assert [estimate.means[0, :2].tolist() for estimate in record.estimates] == [[t, 0.0] for t in record.times]
 
 
@@ -232,7 +232,7 @@ def test_a_tracker_need_not_know_turn_rates(tmp_path: Path) -> None:
     told = "[{'state': [1.0, 2.0, 3.0, 4.0], 'cov': [[float(i == j) for i in range(4)] for j in range(4)]}]"
     program = section(tmp_path, ANSWERS.replace("ANSWER", SAYS % told))
     scenario = replace_fields(load_scenario("polar-10"), {"fusion": {"kind": "central", "filter": program}})
-    estimate = run_scenario(scenario, "still", seed=0).estimates[0]
+    estimate = run_scenario(scenario, "stationary", seed=0).estimates[0]
     assert estimate.means.tolist() == [[1.0, 2.0, 3.0, 4.0, 0.0]]
     assert np.diagonal(estimate.covs[0]).tolist() == [1.0, 1.0, 1.0, 1.0, UNKNOWN_VARIANCE]
 
@@ -242,7 +242,7 @@ def test_the_tracker_of_the_page_reports_what_the_first_sensor_says(name: str, t
     program = section(tmp_path, SHOWN["last.py"])
     scenario = replace_fields(load_scenario(name), {"fusion": {"kind": "central", "filter": program}})
     sensor = build_sensors(scenario)[0].filter.sensor
-    record = run_scenario(scenario, "still", seed=0)
+    record = run_scenario(scenario, "stationary", seed=0)
     scan = scans_of_record(record, scenario)[4][0]
     assert scan is not None
     places = sensor.measurement.positions(scan.measurements, record.poses[4, 0])
@@ -268,7 +268,7 @@ BAD_ESTIMATES = {
 def test_bad_estimates_are_named(answer: str, tmp_path: Path) -> None:
     text = ANSWERS.replace("ANSWER", f"print(json.dumps({answer}), flush=True)")
     with pytest.raises(RunStopped, match=r"in the filter: program .*, answer 2: .*" + BAD_ESTIMATES[answer]):
-        run_scenario(tracked(section(tmp_path, text)), "still", seed=0)
+        run_scenario(tracked(section(tmp_path, text)), "stationary", seed=0)
 
 
 @pytest.mark.skipif(not hasattr(os, "getpgid"), reason="process groups are POSIX's")

@@ -111,7 +111,7 @@ def test_what_is_read_and_resolved_is_told_in_two_lines() -> None:
     assert first == "Scenario paper-e: 40 scans, 2 sensors, filter delta_glmb, fusion cm_delta_glmb"
     assert second.startswith("  Reconstruction of the scenario of the paper")
     assert len(second) <= WIDEST + 2
-    axes = 'scenarios = ["paper-e", "linear-10"]\nplanners = ["still", "idm"]\nruns = 3\n'
+    axes = 'scenarios = ["paper-e", "linear-10"]\nplanners = ["stationary", "idm"]\nruns = 3\n'
     campaign = resolve(parse_spec(f'name = "trial"\n{axes}'))
     assert repr(campaign) == "Campaign trial: 4 cells, 12 runs\n  scenario: paper-e, linear-10; planner: still, idm"
     assert "<br>scenario: paper-e, linear-10" in campaign._repr_html_()
@@ -186,7 +186,7 @@ def test_the_package_offers_its_rooms_and_imports_none_before_it_is_asked_for() 
 
 
 def test_a_results_folder(tmp_path: Path) -> None:
-    spec = parse_spec('name = "trial"\nscenarios = ["linear-10"]\nplanners = ["still"]\nruns = 1\n')
+    spec = parse_spec('name = "trial"\nscenarios = ["linear-10"]\nplanners = ["stationary"]\nruns = 1\n')
     run_campaign(resolve(spec), tmp_path / "out")
     first, second = repr(open_results(tmp_path / "out")).splitlines()
     assert first == "CampaignResults of trial: 1 of 1 run finished, 1 cell"

@@ -22,7 +22,7 @@ def main(names: list[str]) -> None:
         print(f"compiling for {name} ...", file=sys.stderr, flush=True)
         scenario = load_scenario(name)
         precompile(scenario)
-        run_scenario(scenario, "jdm" if len(scenario.model.sensors) > 1 else "still", seed=0)
+        run_scenario(scenario, "jdm" if len(scenario.model.sensors) > 1 else "stationary", seed=0)
 
 
 if __name__ == "__main__":

@@ -53,7 +53,7 @@ _MOST_DRAWS = 8  # for a random scenario that is valid
 
 def cases(num_random: int) -> Iterator[Case]:
     """All of them."""
-    short = {"time.num_steps": 12, "control.decision_steps": [10], "ospa.to_step": 12}
+    short = {"time.num_steps": 12, "control.decision_steps": [10], "ospa.last_scan": 12}
     for run, strategy in product(range(40), ("jdm", "idm")):
         yield Case(f"paper-a/{strategy}/{run}", "paper-a", short, strategy, run)
     filters = {
@@ -66,7 +66,7 @@ def cases(num_random: int) -> Iterator[Case]:
         "paper-a": (short, "jdm"),
         "six-cameras": ({"control.decision_steps": [2, 4]}, "jdm"),
         "eight-mobile": ({"control.decision_steps": [2]}, "jdm"),
-        "three-radars": ({}, "still"),
+        "three-radars": ({}, "stationary"),
     }
     for scene, (changes, strategy) in scenes.items():
         for kind, fusions in filters.items():
@@ -82,8 +82,17 @@ def cases(num_random: int) -> Iterator[Case]:
         changes = {"control.reward": {"kind": reward}, "control.search": {"kind": search}}
         yield Case(f"reward/{reward}/{search}", "paper-a", short | lmbs | changes)
     for kind, scene in product(("phd", "cphd", "cb_member", *filters), ("linear-10", "polar-10")):
-        yield Case(f"{scene}/{kind}", scene, {"filter": {"kind": kind}, "estimator": {"kind": "map"}}, "still")
-    for strategy in ("lookahead", "nearest", "assigned", "centroid", "oracle", "told", "random", "fixed"):
+        yield Case(f"{scene}/{kind}", scene, {"filter": {"kind": kind}, "estimator": {"kind": "map"}}, "stationary")
+    for strategy in (
+        "lookahead",
+        "nearest",
+        "assigned_target",
+        "centroid",
+        "oracle",
+        "true_targets",
+        "random",
+        "constant",
+    ):
         yield Case(f"strategy/{strategy}", "paper-a", short, strategy)
     for number in range(num_random):
         yield Case(f"{RANDOM}/{number:04}", RANDOM, {}, run=number)

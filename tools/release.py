@@ -133,7 +133,9 @@ def main(scenarios: list[str]) -> int:
                     told = begun.first_figure(trial, compiles=False, **processor)
                     print(f"{compiled.name}: {told}", flush=True)
             anew = CleanEnvironment(pure, "[report]", scratch)
-            print(f"{pure.name}: {anew.first_figure('linear-10', '--planner', 'still', compiles=True)}", flush=True)
+            print(
+                f"{pure.name}: {anew.first_figure('linear-10', '--planner', 'stationary', compiles=True)}", flush=True
+            )
         except ReleaseError as error:
             print(error, file=sys.stderr)
             return 1

@@ -56,7 +56,7 @@ def noise(scene: Told, dt: float) -> np.ndarray:
     motion = scene["motion"]
     turning = motion["kind"] == "coordinated_turn"
     variance = max(motion["sigma_v"], 8.0 if turning else 0.0) ** 2
-    held = motion.get("acceleration") != "continuous"
+    held = motion.get("noise_model") != "continuous_white"
     one = np.array([[dt**4 / 4, dt**3 / 2], [dt**3 / 2, dt**2]] if held else [[dt**3 / 3, dt**2 / 2], [dt**2 / 2, dt]])
     return variance * np.kron(one, np.eye(2))
 

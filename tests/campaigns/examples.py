@@ -10,9 +10,9 @@ from vedette.campaigns.spec import spec_from_data
 SPEC: dict[str, Any] = {
     "name": "small",
     "scenarios": ["paper-a"],
-    "planners": ["idm", "still"],
+    "planners": ["idm", "stationary"],
     "runs": 4,
-    "set": {"time.num_steps": 12, "control.decision_steps": [10], "control.num_samples": 2, "ospa.to_step": 12},
+    "set": {"time.num_steps": 12, "control.decision_steps": [10], "control.num_samples": 2, "ospa.last_scan": 12},
 }
 
 

@@ -35,7 +35,7 @@ for line in sys.stdin:
     answer = {"ready": True} if "role" in told else {"actions": [0] * len(told["sensors"]), "counts": {"rewards": 3}}
     print(json.dumps(answer), flush=True)
 """
-STEERED = replace(scenes()["paper-a"], beside=("nearest", "fixed"))
+STEERED = replace(scenes()["paper-a"], beside=("nearest", "constant"))
 TRACKED = scenes()["polar-10"]
 
 
@@ -67,7 +67,7 @@ def test_an_entrant_is_paired_with_the_first_and_its_counts_are_told(tmp_path: P
     run_all(STEERED, tmp_path / "out", own)
     table = scene_table(STEERED, tmp_path / "out")
     assert table is not None
-    assert [each.label for each in table.standings] == ["nearest", "fixed", "mine"]
+    assert [each.label for each in table.standings] == ["nearest", "constant", "mine"]
     first, fixed, mine = table.standings
     assert (first.difference, first.is_own, mine.is_own, mine.num_runs, mine.num_lost) == (None, True, False, 2, 0)
     assert fixed.difference is not None
@@ -83,7 +83,7 @@ def test_an_entrant_is_paired_with_the_first_and_its_counts_are_told(tmp_path: P
     assert f"| mine | {float(mine.ospa.mean):.2f} |" in page
     assert digest in page
     rows = list(csv.DictReader(io.StringIO(benchmark_csv([table]))))
-    assert [each["strategy"] for each in rows] == ["nearest", "fixed", "mine"]
+    assert [each["strategy"] for each in rows] == ["nearest", "constant", "mine"]
     assert float(rows[2]["ospa"]) == float(mine.ospa.mean)
     assert float(rows[2]["median"]) == pytest.approx(float(mine.ospa.mean))  # of two runs
     assert float(rows[2]["worst"]) == mine.tail.worst > mine.tail.median

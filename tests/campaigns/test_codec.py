@@ -29,7 +29,7 @@ from vedette.simulation.tables import LAYOUTS, OPTIONAL
 NUMBERS = st.floats(width=64, allow_nan=True, allow_infinity=True)
 
 
-@pytest.mark.parametrize("planner", ["jdm", "idm", "random", "fixed"])
+@pytest.mark.parametrize("planner", ["jdm", "idm", "random", "constant"])
 def test_a_run_is_decoded_bit_for_bit(planner):
     record, metrics = make_run(planner, 3)
     assert_same(decode(encode(record)), replace(record, timings={}))
@@ -48,7 +48,7 @@ def test_every_number_is_decoded_as_it_was(values):
 
 
 def test_a_run_without_targets_estimates_and_timings_is_decoded():
-    record, _ = make_run("fixed", 0)
+    record, _ = make_run("constant", 0)
     nothing = Estimate.empty(4)
     truth = replace(record.truth, offsets=np.zeros(41, np.int64), ids=np.empty(0, np.int64), states=np.empty((0, 4)))
     record = replace(record, estimates=(nothing,) * 40, truth=truth, timings={})

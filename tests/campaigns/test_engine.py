@@ -71,15 +71,15 @@ def test_a_task_that_kills_its_workers_is_told_and_the_others_are_done(
     monkeypatch.setattr(local, "perform", partial(deadly, tmp_path / "deaths"))
     results = list(on_local_workers())
     failed = [result for result in results if isinstance(result, FailedRun)]
-    assert failed == [FailedRun("still", 7, "every worker that took it died (out of memory?)")]
-    expected = {key: value for key, value in alone.items() if key != ("still", 7)}
+    assert failed == [FailedRun("stationary", 7, "every worker that took it died (out of memory?)")]
+    expected = {key: value for key, value in alone.items() if key != ("stationary", 7)}
     assert payloads(result for result in results if isinstance(result, CompletedRun)) == expected
     assert len((tmp_path / "deaths").read_text()) == 2 + 2 * 2  # as one of a task, and alone
 
 
 def deadly(deaths: Path, task: Task) -> Any:
     """As `perform`, but one run takes its worker's life."""
-    if task.cell.name == "still" and 7 in task.runs:
+    if task.cell.name == "stationary" and 7 in task.runs:
         with deaths.open("a") as file:
             file.write("x")
         os.kill(os.getpid(), signal.SIGKILL)
@@ -125,7 +125,7 @@ def test_a_worker_that_is_killed_in_the_middle_of_a_message_is_waited_for_by_nob
 
 def half_said(once: Path, task: Task) -> Any:
     """As `perform`, but the first worker that is asked for a certain run ends while it says so."""
-    if task.cell.name == "still" and 7 in task.runs and not once.exists():
+    if task.cell.name == "stationary" and 7 in task.runs and not once.exists():
         once.touch()
         frame = sys._getframe()
         while "result_queue" not in frame.f_locals:
@@ -152,7 +152,12 @@ def test_what_is_finished_when_ctrl_c_comes_is_given_back(monkeypatch: pytest.Mo
 
     monkeypatch.setattr(engine, "perform", until)
     results = in_process(TaskQueue(small_campaign(runs=3), ()))
-    assert [(each.cell, each.run) for each in next(results)] == [("idm", 0), ("still", 0), ("idm", 1), ("still", 1)]
+    assert [(each.cell, each.run) for each in next(results)] == [
+        ("idm", 0),
+        ("stationary", 0),
+        ("idm", 1),
+        ("stationary", 1),
+    ]
     with pytest.raises(KeyboardInterrupt):
         next(results)
 

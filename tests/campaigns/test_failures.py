@@ -30,7 +30,7 @@ def broken(monkeypatch: pytest.MonkeyPatch) -> pytest.MonkeyPatch:
 
     def sometimes(scenario: Any, planner: str, *, run: int, **options: Any) -> Any:
         with monkeypatch.context() as patch:
-            if (planner, run) == ("still", 1):
+            if (planner, run) == ("stationary", 1):
                 patch.setattr(DeltaGlmbFilter, "step", failing)
             return run_scenario(scenario, planner, run=run, **options)
 
@@ -45,10 +45,10 @@ def test_a_failed_run_says_where_it_stopped_until_it_is_done(broken: pytest.Monk
         "paper-a, still, seed 0, run 1: stopped at step 7 of 12 (7 s), in the filter of sensor 1: no hypothesis has "
         "positive weight"
     )
-    assert (failed.cell, failed.run, failed.message) == ("still", 1, message)
+    assert (failed.cell, failed.run, failed.message) == ("stationary", 1, message)
     results = open_results(folder)
-    assert results.failures() == (Failure("still", 1, 1, message),)
-    assert results.missing("still") == (1,)
+    assert results.failures() == (Failure("stationary", 1, 1, message),)
+    assert results.missing("stationary") == (1,)
     told = CliRunner().invoke(app, ["results", str(folder)])
     assert f"failed: 1 run; the same command tries again:\n  cell still, run 1: {message}" in told.stdout
     write_report(results, tmp_path / "report.html")
@@ -56,10 +56,10 @@ def test_a_failed_run_says_where_it_stopped_until_it_is_done(broken: pytest.Monk
     assert "1 run failed." in page
     assert "stopped at step 7 of 12 (7 s), in the filter of sensor 1" in page
     (again,) = run_campaign(campaign, folder).failed
-    assert open_results(folder).failures() == (Failure("still", 1, 2, again.message),)
+    assert open_results(folder).failures() == (Failure("stationary", 1, 2, again.message),)
     broken.undo()
     assert run_campaign(campaign, folder).num_completed == 1
     results = open_results(folder)
-    assert (results.failures(), results.missing("still")) == ((), ())
+    assert (results.failures(), results.missing("stationary")) == ((), ())
     write_report(results, tmp_path / "report.html")
     assert "failed" not in (tmp_path / "report.html").read_text("utf-8")

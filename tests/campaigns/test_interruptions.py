@@ -27,14 +27,14 @@ RUNS = 40
 SPEC = f"""
 name = "small"
 scenarios = ["paper-a"]
-planners = ["idm", "still"]
+planners = ["idm", "stationary"]
 runs = {RUNS}
 
 [set]
 "time.num_steps" = 12
 "control.decision_steps" = [10]
 "control.num_samples" = 2
-"ospa.to_step" = 12
+"ospa.last_scan" = 12
 """
 
 

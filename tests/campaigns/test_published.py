@@ -39,7 +39,7 @@ def test_they_resolve_to_decisions_after_every_scan_but_the_last(name: str) -> N
     for cell in campaign.cells:
         model = cell.scenario.model
         assert model.decision_steps == tuple(range(1, model.time.num_steps))
-        assert model.ospa.from_step == 1
+        assert model.ospa.first_scan == 1
         slow = name.endswith("-slow")
         assert model.motion.model_dump()["sigma_v"] == (3.0 if slow else 15.0)
         assert isinstance(model.filter, Filter)
@@ -53,9 +53,9 @@ def test_published_figures_are_those_of_the_source() -> None:
         for name, yardstick in published_comparisons().items()
     }
     assert found["deciding-eight-mobile"]["FDCD"] == (1.73, 10)
-    assert found["deciding-eight-mobile"]["fixed"] == (68.58, 10)
+    assert found["deciding-eight-mobile"]["constant"] == (68.58, 10)
     assert found["deciding-six-cameras"]["FDCD"] == (3.39, 30)
-    assert found["deciding-six-cameras"]["fixed"] == (60.36, 30)
+    assert found["deciding-six-cameras"]["constant"] == (60.36, 30)
     for yardstick in published_comparisons().values():
         means = [score.ospa for score in yardstick.published]
         assert means == sorted(means)
@@ -91,8 +91,8 @@ def test_scores_are_those_of_the_runs(tmp_path: Path) -> None:
 
 def test_what_is_not_known_is_left_empty() -> None:
     assert score_row(PUBLISHED) == ("published: X", "1.73 ± 0.31", "", "", "\N{MINUS SIGN}0.10", "", "111", "10")
-    one = StrategyScore("fixed", 2.0, None, 2.0, None, 0.0, 0.5, 1e-5, 1)
-    assert score_row(one) == ("fixed", "2.00", "2.00", "", "+0.00", "50.0 %", "<0.0001", "1")
+    one = StrategyScore("constant", 2.0, None, 2.0, None, 0.0, 0.5, 1e-5, 1)
+    assert score_row(one) == ("constant", "2.00", "2.00", "", "+0.00", "50.0 %", "<0.0001", "1")
     assert score_markdown((PUBLISHED,), "m", "jdm").splitlines() == [
         "| Strategy | OSPA (m) | Worst run (m) | More than jdm (m) | N error | Tracked | s a decision | Runs |",
         "| --- | ---: | ---: | ---: | ---: | ---: | ---: | ---: |",

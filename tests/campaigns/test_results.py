@@ -81,7 +81,7 @@ def test_what_is_finished_and_missing(whole):
         results.record("random-rate-5.0", 2)
     for ask in (results.finished, lambda cell: results.record(cell, 0)):
         with pytest.raises(InputError, match=r"cell: expected one of jdm-rate-5\.0"):
-            ask("fixed")
+            ask("constant")
 
 
 def test_strategies_are_compared_over_the_runs_that_all_have(whole, campaign):

@@ -29,7 +29,7 @@ def test_the_least_campaign_compares_the_papers_strategies() -> None:
 def test_every_combination_of_all_axes_is_a_cell() -> None:
     full = campaign(
         """
-        planners = ["jdm", "still"]
+        planners = ["jdm", "stationary"]
         fusions = ["cm_delta_glmb", "clmb"]
         set."ospa.cutoff" = 50.0
         [grid]
@@ -44,7 +44,7 @@ def test_every_combination_of_all_axes_is_a_cell() -> None:
     assert first.name == "paper-a-jdm-cm_delta_glmb-speed-30.0"
     assert last.settings == {
         "scenario": "paper-e",
-        "planner": "still",
+        "planner": "stationary",
         "fusion": "clmb",
         "sensors.*.platform.speed": 70.0,
         "control.num_samples": 5,
@@ -54,13 +54,13 @@ def test_every_combination_of_all_axes_is_a_cell() -> None:
     assert last.scenario.model.control.num_samples == 5
     assert last.scenario.model.ospa.cutoff == 50.0
     assert len(full.groups()) == 12
-    assert all([cell.planner for cell in group] == ["jdm", "still"] for group in full.groups())
+    assert all([cell.planner for cell in group] == ["jdm", "stationary"] for group in full.groups())
 
 
 def test_variants_hold_settings_that_belong_together() -> None:
     variants = campaign(
         """
-        planners = ["still"]
+        planners = ["stationary"]
         [[variants]]
         name = "GLMB"
         [[variants]]
@@ -74,7 +74,7 @@ def test_variants_hold_settings_that_belong_together() -> None:
 
 
 def test_a_central_filter_is_compared_with_fusions() -> None:
-    both = campaign('planners = ["still"]\nfusions = ["cm_delta_glmb", "central"]\n')
+    both = campaign('planners = ["stationary"]\nfusions = ["cm_delta_glmb", "central"]\n')
     assert [cell.name for cell in both.cells] == ["still-cm_delta_glmb", "still-central"]
     assert both.compare == "fusion"
 
@@ -84,7 +84,7 @@ def test_scenarios_are_named_or_lie_beside_the_file(tmp_path: Path) -> None:
     folder.mkdir()
     (folder / "scene.yaml").write_text(resolve_text("paper-e"))
     (folder / "spec.toml").write_text(
-        'name = "x"\nscenarios = ["scene.yaml", "paper-a"]\nruns = 1\nplanners = ["still"]'
+        'name = "x"\nscenarios = ["scene.yaml", "paper-a"]\nruns = 1\nplanners = ["stationary"]'
     )
     beside = resolve(load_spec(folder / "spec.toml"), folder)
     assert [cell.name for cell in beside.cells] == ["scene-still", "paper-a-still"]
@@ -116,7 +116,7 @@ def test_the_digest_covers_the_files_that_a_scenario_names(tmp_path: Path) -> No
     model = "from vedette.models import constant_velocity\n\n\ndef motion():\n    return constant_velocity({})\n"
     (tmp_path / "own.py").write_text(model.format(5.0))
     own = 'set.motion = {kind = "custom", function = "own.py:motion", state_dim = 4}'
-    spec = parse_spec(f'name = "x"\nscenarios = ["scene.yaml"]\nruns = 1\nplanners = ["still"]\n{own}')
+    spec = parse_spec(f'name = "x"\nscenarios = ["scene.yaml"]\nruns = 1\nplanners = ["stationary"]\n{own}')
     before = resolve(spec, tmp_path).digest()
     (tmp_path / "own.py").write_text(model.format(6.0))
     assert resolve(spec, tmp_path).digest() != before

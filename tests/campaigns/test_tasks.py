@@ -47,29 +47,29 @@ def learnt(queue: TaskQueue, *results: CompletedRun) -> None:
 def test_runs_of_equal_number_come_together() -> None:
     assert drain(TaskQueue(small_campaign(runs=2), ())) == [
         ("idm", (0,)),
-        ("still", (0,)),
+        ("stationary", (0,)),
         ("idm", (1,)),
-        ("still", (1,)),
+        ("stationary", (1,)),
     ]
 
 
 def test_finished_runs_are_left_out() -> None:
-    queue = TaskQueue(small_campaign(runs=2), {("idm", 0), ("still", 1)})
+    queue = TaskQueue(small_campaign(runs=2), {("idm", 0), ("stationary", 1)})
     assert len(queue) == 2
-    assert drain(queue) == [("still", (0,)), ("idm", (1,))]
+    assert drain(queue) == [("stationary", (0,)), ("idm", (1,))]
     assert len(queue) == 0
 
 
 def test_a_task_holds_a_least_time_of_work_once_that_is_known() -> None:
     queue = TaskQueue(small_campaign(runs=30), ())
     # The second run of idm is learnt from: the first of a process also loads the kernels.
-    learnt(queue, landed("idm", 7.0), landed("still", 3.0), landed("idm", 0.1 * MIN_TASK_SECONDS))
-    assert drain(queue)[:3] == [("still", (1,)), ("idm", tuple(range(2, 12))), ("still", (2,))]
+    learnt(queue, landed("idm", 7.0), landed("stationary", 3.0), landed("idm", 0.1 * MIN_TASK_SECONDS))
+    assert drain(queue)[:3] == [("stationary", (1,)), ("idm", tuple(range(2, 12))), ("stationary", (2,))]
 
 
 def test_the_more_workers_the_longer_are_tasks_until_little_is_left() -> None:
-    queue = TaskQueue(small_campaign(planners=["still"], runs=1000), ())
-    learnt(queue, landed("still", 0.1), landed("still", 0.1))
+    queue = TaskQueue(small_campaign(planners=["stationary"], runs=1000), ())
+    learnt(queue, landed("stationary", 0.1), landed("stationary", 0.1))
     sizes = []
     while (task := queue.take(200)) is not None:
         sizes.append(len(task.runs))
@@ -80,7 +80,9 @@ def test_the_more_workers_the_longer_are_tasks_until_little_is_left() -> None:
 
 
 def test_the_first_run_of_each_set_of_kernels_goes_before_the_others() -> None:
-    campaign = small_campaign(planners=["jdm", "idm", "random", "still"], fusions=["cm_delta_glmb", "clmb"], runs=2)
+    campaign = small_campaign(
+        planners=["jdm", "idm", "random", "stationary"], fusions=["cm_delta_glmb", "clmb"], runs=2
+    )
     queue = TaskQueue(campaign, {("jdm-clmb", run) for run in range(2)})
     first = []
     while (task := queue.take()) is not None:

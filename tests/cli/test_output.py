@@ -27,7 +27,7 @@ posix = pytest.mark.skipif(os.name == "nt", reason="of POSIX systems")
 @pytest.fixture
 def odd(tmp_path: Path) -> Path:
     """A scenario of few scans with a name that markup, encodings and mathematical text each stumble over."""
-    fields = {"name": ODD, "sensors.0.name": ODD, "time.num_steps": 3, "ospa.from_step": None, "ospa.to_step": None}
+    fields = {"name": ODD, "sensors.0.name": ODD, "time.num_steps": 3, "ospa.first_scan": None, "ospa.last_scan": None}
     fields |= {"birth.steps": [1], "targets.tracks": [{"state": [x, 0.0, 1.0, 1.0]} for x in (0.0, 300.0)]}
     path = tmp_path / "odd.yaml"
     path.write_text(dump_scenario(replace_fields(load_scenario("linear-10"), fields).model), encoding="utf-8")
@@ -45,10 +45,12 @@ def test_names_are_text_and_no_markup(odd: Path, tmp_path: Path) -> None:
     spec = tmp_path / "spec.toml"
     name = ODD.replace("\\", "\\\\")
     variants = "".join(f'[[variants]]\nname = "{name}{end}"\n[variants.set]\n' for end in (" 1", " 2"))
-    spec.write_text(f'name = "{name}"\nscenarios = ["odd.yaml"]\nplanners = ["still"]\nruns = 1\n{variants}', "utf-8")
+    spec.write_text(
+        f'name = "{name}"\nscenarios = ["odd.yaml"]\nplanners = ["stationary"]\nruns = 1\n{variants}', "utf-8"
+    )
     for command in (
         ("show", odd, "--out", tmp_path / "picture.svg"),
-        ("run", odd, "--planner", "still"),
+        ("run", odd, "--planner", "stationary"),
         ("campaign", spec, "--workers", 1, "--out", tmp_path / "results"),
         ("results", tmp_path / "results"),
         ("report", tmp_path / "results"),
@@ -117,7 +119,7 @@ def test_too_many_open_files_are_one_line(tmp_path: Path) -> None:
     import resource
 
     spec = tmp_path / "spec.toml"
-    spec.write_text('name = "few"\nscenarios = ["linear-10"]\nplanners = ["still"]\nruns = 9\n')
+    spec.write_text('name = "few"\nscenarios = ["linear-10"]\nplanners = ["stationary"]\nruns = 9\n')
 
     def limit() -> None:
         resource.setrlimit(resource.RLIMIT_NOFILE, (20, 20))

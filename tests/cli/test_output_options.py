@@ -21,14 +21,14 @@ from vedette.scenarios.dumping import dump_scenario
 from vedette.scenarios.overrides import replace_fields
 
 COMMANDS: dict[str, Any] = typer.main.get_command(app).commands  # type: ignore[attr-defined]
-SPEC = 'name = "trial"\nscenarios = ["short.yaml"]\nplanners = ["still", "own"]\nruns = 2\n'
+SPEC = 'name = "trial"\nscenarios = ["short.yaml"]\nplanners = ["stationary", "own"]\nruns = 2\n'
 WAIT = 600.0  # s
 
 
 @pytest.fixture
 def place(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """A working folder with a scenario of few scans and a strategy of its own, one with a fault, and a campaign."""
-    fields: dict[str, Any] = {"time.num_steps": 3, "ospa.from_step": None, "ospa.to_step": None}
+    fields: dict[str, Any] = {"time.num_steps": 3, "ospa.first_scan": None, "ospa.last_scan": None}
     fields |= {"birth.steps": [1], "targets.tracks": [{"state": [x, 0.0, 1.0, 1.0]} for x in (0.0, 40.0)]}
     fields |= {"planners": {"own": {"kind": "independent"}}}
     text = dump_scenario(replace_fields(load_scenario("linear-10"), fields).model)
@@ -53,7 +53,7 @@ CALLS: list[tuple[tuple[str, ...], set[str]]] = [
     (("show", "short.yaml", "--out", "picture.png"), {"file", "scenario", "picture"}),
     (("schema", "--out", "schema.json"), {"written"}),
     (
-        ("run", "short.yaml", "--planner", "still", "--out", "run"),
+        ("run", "short.yaml", "--planner", "stationary", "--out", "run"),
         {"decisions", "ospa", "seconds", "diagnostics", "folder"},
     ),
     (("results", "run"), {"decisions", "ospa", "written"}),
@@ -78,7 +78,10 @@ CALLS: list[tuple[tuple[str, ...], set[str]]] = [
     (("upgrade", "trial-results"), {"folder", "format_was", "format"}),
     (("report", "trial-results"), {"page", "figures"}),
     (("demo", "short.yaml", "--planners", "still,own", "--workers", "1"), {"comparisons", "page"}),
-    (("reproduce", "short.yaml", "--runs", "1", "--planners", "still", "--workers", "1"), {"comparisons", "report"}),
+    (
+        ("reproduce", "short.yaml", "--runs", "1", "--planners", "stationary", "--workers", "1"),
+        {"comparisons", "report"},
+    ),
     (("benchmark", "--scenes", "polar-10", "--runs", "1", "--workers", "1"), {"folder", "report", "scenes"}),
 ]
 LISTS = [("list",), ("reproduce", "--list"), ("benchmark", "--list"), ("schema",)]
@@ -115,7 +118,7 @@ def test_documents_have_the_numbers_unrounded(place: Path) -> None:
     assert f"mean OSPA   {ospa['total']:.2f} m" in call("run", "short.yaml", "--planner", "own").stdout
     assert call("campaign", "spec.toml", "--workers", "1").exit_code == 0
     (group,) = json.loads(call("results", "trial-results", "--json").stdout)["comparisons"]
-    assert [each["strategy"] for each in group["strategies"]] == ["still", "own"]
+    assert [each["strategy"] for each in group["strategies"]] == ["stationary", "own"]
     assert all(f"{each['total_mean_m']:.2f}" in call("results", "trial-results").stdout for each in group["strategies"])
 
 
@@ -171,7 +174,7 @@ def test_the_overwrite_option_is_suggested_and_works(place: Path, words: tuple[s
 
 
 def test_a_run_names_it_too(place: Path) -> None:
-    words = ("run", "short.yaml", "--planner", "still", "--out", "run")
+    words = ("run", "short.yaml", "--planner", "stationary", "--out", "run")
     assert call(*words).exit_code == 0
     refused = call(*words)
     assert refused.exit_code == 1
@@ -204,7 +207,7 @@ def test_completion_lists_available_names(place: Path) -> None:
         (("show", "fa"), ["faulty.yaml"]),
         (("check", "pol"), ["polar-10"]),
         (("run", "short.yaml", "--planner", "o"), ["oracle", "own"]),
-        (("run", "short.yaml", "--planner", "s"), ["still"]),
+        (("run", "short.yaml", "--planner", "s"), ["stationary"]),
         (("run", "gone.yaml", "--planner", "i"), ["idm"]),
         (("reproduce", "short.yaml", "--planners", "jdm,o"), ["jdm,oracle", "jdm,own"]),
         (("reproduce", "deciding-six"), ["deciding-six-cameras"]),

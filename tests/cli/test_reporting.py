@@ -14,7 +14,7 @@ from vedette.cli import app
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("cli") / "results"
-    results_of(folder, campaign_of(planners=["fixed", "still"]))
+    results_of(folder, campaign_of(planners=["constant", "stationary"]))
     return folder
 
 
@@ -45,7 +45,7 @@ def test_the_page_is_in_the_folder_by_default_and_shows_the_chosen_runs(folder: 
 @pytest.mark.parametrize(
     ("runs", "status", "message"),
     [
-        ("fixed", 2, "expected CELL:RUN, such as jdm:0; got 'fixed'"),
+        ("constant", 2, "expected CELL:RUN, such as jdm:0; got 'constant'"),
         ("fixed:x", 2, "got 'fixed:x'"),
         ("fixed:0,", 2, "got ''"),
         ("fixed:7", 1, "--runs: expected a finished run of cell fixed (0 to 1); got 7"),

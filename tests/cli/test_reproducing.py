@@ -44,13 +44,13 @@ def test_the_list_names_every_published_comparison() -> None:
 
 
 def test_a_published_comparison_is_run_and_printed_next_to_published_numbers(short: PublishedComparison) -> None:
-    result = call(NAME, "--planners", "random,fixed")
+    result = call(NAME, "--planners", "random,constant")
     assert result.exit_code == 0, result.output
     assert "published: FDCD     3.39 ± 0.15" in result.stdout
     assert "arXiv 2604.19160" in " ".join(result.stdout.split())
     assert f"{NAME}, seed 0: all 4 runs are finished" in result.stdout
     folder = Path(f"{NAME}-results")
-    assert [open_results(folder).finished(cell) for cell in ("random", "fixed")] == [(0, 1), (0, 1)]
+    assert [open_results(folder).finished(cell) for cell in ("random", "constant")] == [(0, 1), (0, 1)]
     assert sorted(file.name for file in folder.iterdir() if file.suffix in (".md", ".html")) == [
         "report.html",
         "yardstick.md",
@@ -60,12 +60,12 @@ def test_a_published_comparison_is_run_and_printed_next_to_published_numbers(sho
 
 
 def test_the_same_command_goes_on_and_may_ask_for_more_runs(short: PublishedComparison) -> None:
-    assert call(NAME, "--planners", "fixed", "--runs", "1", "--out", "there").exit_code == 0
-    assert open_results("there").finished("fixed") == (0,)
-    result = call(NAME, "--planners", "fixed", "--runs", "2", "--out", "there")
+    assert call(NAME, "--planners", "constant", "--runs", "1", "--out", "there").exit_code == 0
+    assert open_results("there").finished("constant") == (0,)
+    result = call(NAME, "--planners", "constant", "--runs", "2", "--out", "there")
     assert result.exit_code == 0, result.output
     assert "1 are there already" in result.stderr
-    assert open_results("there").finished("fixed") == (0, 1)
+    assert open_results("there").finished("constant") == (0, 1)
     other = call(NAME, "--planners", "random", "--out", "there")
     assert other.exit_code == 1
     assert "expected a folder of this campaign" in other.stderr
@@ -73,7 +73,7 @@ def test_the_same_command_goes_on_and_may_ask_for_more_runs(short: PublishedComp
 
 @pytest.mark.parametrize("columns", [40, 60, 80, 120])
 def test_every_number_is_shown_at_any_width(short: PublishedComparison, columns: int) -> None:
-    result = call(NAME, "--planners", "fixed", "--runs", "1", columns=columns)
+    result = call(NAME, "--planners", "constant", "--runs", "1", columns=columns)
     assert result.exit_code == 0, result.output
     table = result.stdout[: result.stdout.index("Published: ")]
     assert max(map(len, table.splitlines())) <= columns
@@ -94,11 +94,12 @@ def test_ctrl_c_prints_how_to_continue(short: PublishedComparison, monkeypatch: 
 @pytest.mark.parametrize(
     ("words", "status", "message"),
     [
-        ((NAME, "--planners", "fixed,fixed"), 2, "expected each strategy once; got fixed,fixed"),
+        ((NAME, "--planners", "constant,constant"), 2, "expected each strategy once; got constant,constant"),
         (
             (NAME, "--planners", "clever"),
             1,
-            "lookahead, nearest, assigned, centroid, oracle, told, random, fixed, still, greedy; got 'clever'",
+            "lookahead, nearest, assigned_target, centroid, oracle, true_targets, random, constant, stationary, "
+            "greedy; got 'clever'",
         ),
         (
             ("deciding-six-camera",),

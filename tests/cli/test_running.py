@@ -20,7 +20,7 @@ def scenario_file(tmp_path):
         ("num_steps: 40", "num_steps: 10"),
         ("decision_steps: [10, 20, 30]", "decision_steps: [8]"),
         ("num_samples: 40", "num_samples: 2"),
-        ("from_step: 11, to_step: 40", "from_step: 9, to_step: 10"),
+        ("first_scan: 11, last_scan: 40", "first_scan: 9, last_scan: 10"),
     ):
         text = text.replace(old, new)
     path = tmp_path / "short.yaml"
@@ -93,7 +93,7 @@ def test_ctrl_c_during_figures_reports_that_the_run_is_saved(scenario_file, tmp_
         raise KeyboardInterrupt
 
     monkeypatch.setattr("vedette.evaluation.figures.tracks_figure", interrupted)
-    result = call("run", scenario_file, "--planner", "still", "--out", tmp_path / "results")
+    result = call("run", scenario_file, "--planner", "stationary", "--out", tmp_path / "results")
     assert result.exit_code == 130
     assert f"interrupted: wrote {tmp_path / 'results'}, but not all of its figures" in result.stderr
     assert load_run(tmp_path / "results").num_scans == 10
@@ -101,14 +101,14 @@ def test_ctrl_c_during_figures_reports_that_the_run_is_saved(scenario_file, tmp_
 
 def test_a_run_that_stops_at_once_writes_nothing(scenario_file, tmp_path, monkeypatch):
     fail_at(monkeypatch, 1, NumericalError("no weight"))
-    result = call("run", scenario_file, "--planner", "still", "--out", tmp_path / "results")
+    result = call("run", scenario_file, "--planner", "stationary", "--out", tmp_path / "results")
     assert result.exit_code == 1
     assert result.stderr.endswith("no weight\nnothing was written\n")
     assert not (tmp_path / "results").exists()
 
 
 def test_a_run_ends_with_its_health(scenario_file):
-    result = call("run", scenario_file, "--planner", "still")
+    result = call("run", scenario_file, "--planner", "stationary")
     assert result.stdout.splitlines()[-1] == "diagnostics no problem found"
 
 
@@ -119,16 +119,16 @@ def test_run_without_a_folder_writes_nothing(scenario_file, tmp_path):
 
 def test_reproduce(scenario_file, tmp_path):
     out = tmp_path / "all"
-    result = call("reproduce", scenario_file, "--runs", 2, "--planners", "idm,still", "--workers", 1, "--out", out)
+    result = call("reproduce", scenario_file, "--runs", 2, "--planners", "idm,stationary", "--workers", 1, "--out", out)
     assert result.exit_code == 0, result.output
     assert "idm    independent decisions, CS divergence, other sensors absent" in result.output
     results = open_results(out)
-    assert [results.finished(cell) for cell in ("idm", "still")] == [(0, 1), (0, 1)]
+    assert [results.finished(cell) for cell in ("idm", "stationary")] == [(0, 1), (0, 1)]
     for name in ("report.html", "summary.md", "summary.csv", "figures/ospa.pdf", "tables/scans.parquet"):
         assert (out / name).stat().st_size > 100
-    again = call("reproduce", scenario_file, "--runs", 2, "--planners", "idm,still", "--workers", 1, "--out", out)
+    again = call("reproduce", scenario_file, "--runs", 2, "--planners", "idm,stationary", "--workers", 1, "--out", out)
     assert again.exit_code == 0, again.output
-    other = call("reproduce", scenario_file, "--runs", 2, "--planners", "still", "--workers", 1, "--out", out)
+    other = call("reproduce", scenario_file, "--runs", 2, "--planners", "stationary", "--workers", 1, "--out", out)
     assert other.exit_code == 1
     assert "expected a folder of this campaign" in other.output
 
@@ -140,7 +140,8 @@ def test_reproduce(scenario_file, tmp_path):
         (
             ("run", "paper-a", "--planner", "clever"),
             2,
-            "jdm, idm, lookahead, nearest, assigned, centroid, oracle, told, random, fixed, still",
+            "jdm, idm, lookahead, nearest, assigned_target, centroid, oracle, true_targets, random, constant, "
+            "stationary",
         ),
         (("reproduce", "--planners", "jdm,jdm"), 2, "each strategy once"),
         (("reproduce", "--runs", "0"), 2, "--runs"),

@@ -138,4 +138,4 @@ def test_zones_biases_and_late_scans_are_described_briefly() -> None:
     assert "constraint stay inside, x -3000 to 3000 m, y -3000 to 3000 m" in lines
     assert "boat 2: late share 0.8, up to 30 s, start 600 s, end 1200 s" in lines
     assert "origin lon -1.1171 deg, lat 50.7865 deg" in lines
-    assert "process noise 0.15 m/s^1.5, acceleration continuous" in lines
+    assert "process noise 0.15 m/s^1.5, noise model continuous white" in lines

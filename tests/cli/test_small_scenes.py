@@ -26,12 +26,12 @@ targets:
     - {state: [31.0, 21.0, 0.5, -0.5]}
 sensor_defaults: {noise: {kind: constant, std: [0.02, 3.0]}, clutter: {kind: region, rate: 2.0}}
 sensors:
-  - {position: [0.0, 40.0], platform: {kind: courses, speed: 4.0}}
-  - {position: [0.0, -40.0], platform: {kind: courses, speed: 4.0}}
+  - {position: [0.0, 40.0], platform: {kind: heading, speed: 4.0}}
+  - {position: [0.0, -40.0], platform: {kind: heading, speed: 4.0}}
 control: {decision_steps: [4], num_samples: 2}
 """
 TARGETS = SCENE[SCENE.index("targets:") : SCENE.index("sensor_defaults:")]
-ONE_SENSOR = ("  - {position: [0.0, -40.0], platform: {kind: courses, speed: 4.0}}\n", "")
+ONE_SENSOR = ("  - {position: [0.0, -40.0], platform: {kind: heading, speed: 4.0}}\n", "")
 NO_TARGET = (TARGETS, "targets: {kind: scripted, tracks: []}\n")
 ONE_SCAN = ("time: {num_steps: 6}", "time: {num_steps: 1}")
 NO_DECISION = ("decision_steps: [4]", "decision_steps: []")
@@ -105,7 +105,7 @@ TELLING = (
 )
 def test_a_campaign_of_one_run_is_reported_and_exported(scene: Path, tmp_path: Path) -> None:
     spec, folder = tmp_path / "spec.toml", tmp_path / "results"
-    planners = '["idm", "still"]' if "phd" not in scene.read_text() else '["random", "still"]'
+    planners = '["idm", "stationary"]' if "phd" not in scene.read_text() else '["random", "stationary"]'
     spec.write_text(f'name = "small"\nscenarios = ["{scene.name}"]\nplanners = {planners}\nruns = 1\n')
     called("campaign", spec, "--out", folder, "--workers", 1)
     called("results", folder, "--export", tmp_path / "csv", "--format", "csv")

@@ -24,7 +24,7 @@ def runs(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("video")
     write_recording(folder, seconds=40.0)
     words = [str(folder / "scans.csv"), "--sensors", str(folder / "radars.yaml"), "--truth", str(folder / "truth.csv")]
-    for command in (["track", *words], ["run", "paper-a", "--planner", "still"]):
+    for command in (["track", *words], ["run", "paper-a", "--planner", "stationary"]):
         made = CliRunner().invoke(app, [*command, "--out", str(folder / command[0])])
         assert made.exit_code == 0, made.output
     return folder

@@ -122,7 +122,7 @@ def test_the_nearest_target_is_the_one_with_the_shortest_path() -> None:
     belief, pose = targets([40.0, 0.0], [-74.0, 0.0]), [[-4.0, 0.0, 0.0]]
     assert planned(RulePlanner, belief, pose, ()).chosen_actions[0].tolist() == [STEP, 0.0]
     assert planned(RulePlanner, belief, pose, (WALL,)).chosen_actions[0].tolist() == [-STEP, 0.0]
-    assigned = planned(RulePlanner, belief, pose, (WALL,), rule="assigned").chosen_actions[0]
+    assigned = planned(RulePlanner, belief, pose, (WALL,), rule="assigned_target").chosen_actions[0]
     assert (assigned[0], abs(assigned[1])) == (0.0, STEP)
 
 

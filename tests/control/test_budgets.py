@@ -88,7 +88,7 @@ def test_others_that_stay_scan_and_sensors_beyond_a_number_are_switched_off() ->
         assert not any("given up" in note for note in plan.notes)
 
 
-@pytest.mark.parametrize("planner", ["jdm", "idm", "lookahead", "nearest", "random", "fixed"])
+@pytest.mark.parametrize("planner", ["jdm", "idm", "lookahead", "nearest", "random", "constant"])
 def test_no_strategy_scans_longer_than_the_budget(planner: str) -> None:
     scenario = load_scenario("paper-a")
     sensors = [
@@ -105,7 +105,7 @@ def test_no_strategy_scans_longer_than_the_budget(planner: str) -> None:
     assert num_scans[0] * model.model.time.step_period <= 6.0
     assert num_scans[1] * model.model.time.step_period <= 4.0 + 0.25 * seconds
     assert (record.poses[:, :, LEFT] >= 0.0).all()
-    if planner in ("nearest", "fixed"):
+    if planner in ("nearest", "constant"):
         assert num_scans[0] * model.model.time.step_period == 6.0
 
 

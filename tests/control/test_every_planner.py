@@ -27,9 +27,9 @@ from vedette import models
 from vedette.control import (
     BeamSearch,
     CauchySchwarzReward,
+    ConstantPlanner,
     CoordinateAscent,
     ExpectedLossReward,
-    FixedPlanner,
     HorizonPlanner,
     IndependentPlanner,
     JointPlanner,
@@ -295,10 +295,10 @@ def test_fixed_and_random_courses() -> None:
     east = Actions.of(heading_deg=0.0)
     for actions in ((), (0.0,), (east, Actions(("heading_deg",), np.zeros((2, 1))))):
         with pytest.raises(InputError, match="actions: expected one action of each sensor"):
-            FixedPlanner(actions)  # type: ignore[arg-type]
+            ConstantPlanner(actions)  # type: ignore[arg-type]
     rng = np.random.default_rng(0)
     nothing: Any = None
-    for planner in (FixedPlanner((east, east)), RandomPlanner((mobile_sensor("lmb"),) * 2)):
+    for planner in (ConstantPlanner((east, east)), RandomPlanner((mobile_sensor("lmb"),) * 2)):
         for poses in (np.zeros((1, 3)), np.full((2, 3), np.nan)):
             with pytest.raises(InputError, match="poses: expected"):
                 planner.plan(nothing, poses, rng=rng)
@@ -444,7 +444,7 @@ def test_a_sequence_of_one_decision_is_a_single_one(reward: Any, mode: Any, more
         grid = models.CellGrid(models.Region(-600.0, 600.0, -600.0, 600.0), 6, 6)
         undetected = UndetectedIntensity(grid, np.random.default_rng(1).uniform(0.0, 0.05, grid.num_cells))
         worth = 2.0
-    settings = replace(KNOWN, ideal_measurements=mode, undetected_worth=worth)
+    settings = replace(KNOWN, ideal_measurements=mode, undetected_target_value=worth)
     example = situation("lmb", 3 if more == "three sensors" else 2, settings=settings)
     if more == "scans":
         sensors = (example.sensors[0], replace(example.sensors[1], scan_times=np.array([3.0, 11.0])))

@@ -26,8 +26,8 @@ from control.examples import (
 from control.test_additive import shared, single
 from vedette.control import (
     CauchySchwarzReward,
+    ConstantPlanner,
     Explanation,
-    FixedPlanner,
     IndependentPlanner,
     JointPlanner,
     Plan,
@@ -284,7 +284,7 @@ def test_without_samples_there_are_no_standard_errors() -> None:
 
 def test_plans_without_rewards_say_so() -> None:
     example = shared(2, 2)
-    fixed = FixedPlanner((Actions.of(heading_deg=30.0),) * 2)
+    fixed = ConstantPlanner((Actions.of(heading_deg=30.0),) * 2)
     for planner in (RandomPlanner(example.sensors), fixed):
         why = planner.plan(*example.arguments, rng=np.random.default_rng(1)).explain()
         assert why.reward is None

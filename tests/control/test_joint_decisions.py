@@ -187,7 +187,7 @@ def test_targets_not_found_yet_are_looked_for() -> None:
     assert [action[0] for action in plan.chosen_actions] == [0.0, 90.0]
     assert 0.0 < plan.expected_rewards[0][0] < 100.0 * expected.sum()
     twice, none = (
-        replace(planner, settings=replace(settings, undetected_worth=worth)).plan(
+        replace(planner, settings=replace(settings, undetected_target_value=worth)).plan(
             state, poses, rng=np.random.default_rng(1)
         )
         for worth in (2.0, 0.0)
@@ -200,7 +200,7 @@ def test_targets_not_found_yet_are_looked_for() -> None:
     assert ascent.chosen == plan.chosen
     assert ascent.bound is not None
     assert plan.bound.reward <= ascent.bound.upper + 1e-12
-    wanted = replace(planner, settings=replace(settings, undetected_worth=1.0))
+    wanted = replace(planner, settings=replace(settings, undetected_target_value=1.0))
     nowhere = wanted.plan(replace(state, undetected=None), poses, rng=np.random.default_rng(1))
     assert any("not looked for" in note for note in nowhere.notes)
 

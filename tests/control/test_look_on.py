@@ -238,13 +238,13 @@ def prepared(of: Situation, horizon: Any = None, later: Any = (), hidden: Any = 
 @pytest.mark.parametrize("different", [False, True])
 def test_at_all_is_the_mean_of_evaluators_that_are_prepared_one_by_one(hidden: bool, different: bool) -> None:
     """Joint actions, lines, sensors alone, with what is not found yet, and sensors that scan at times of their own."""
-    of = placed(bernoullis(FAR), POSES, undetected_worth=50.0 if hidden else 0.0)
+    of = placed(bernoullis(FAR), POSES, undetected_target_value=50.0 if hidden else 0.0)
     if different:  # rows of its own for each sensor
         scans: tuple[Any, ...] = None, [3.0, 7.0, 13.0, 17.0, 18.0], [8.0, 12.5, 20.0, 25.0]
         sensors = tuple(replace(own, scan_times=when) for own, when in zip(of.sensors, scans, strict=True))
         of = replace(of, sensors=sensors, beliefs=tuple(map(copy, of.beliefs)))
     searched = undetected() if hidden else None
-    later = tuple(replace(own, undetected_worth=of.settings.undetected_worth) for own in OTHERS)
+    later = tuple(replace(own, undetected_target_value=of.settings.undetected_target_value) for own in OTHERS)
     found, single = prepared(of, None, later, searched), [prepared(of, own, (), searched) for own in (None, *later)]
     assert len({id(own) for own in sums_of(found).bases}) == (3 if different else 1)
     actions = np.concatenate([all_joint_actions((3, 3, 3)), [[-1, 0, 1], [2, -1, -1], [-1, -1, -1]]])
@@ -274,8 +274,8 @@ def test_the_bound_stays_one(hidden: bool) -> None:
     for seed in range(6):
         rng = np.random.default_rng(seed)
         poses = np.column_stack([rng.uniform(-500.0, 500.0, (3, 2)), rng.uniform(-3.0, 3.0, 3)])
-        of = placed(bernoullis(rng.uniform(-900.0, 900.0, (4, 2))), poses, undetected_worth=50.0)
-        later = tuple(replace(own, undetected_worth=50.0) for own in OTHERS)
+        of = placed(bernoullis(rng.uniform(-900.0, 900.0, (4, 2))), poses, undetected_target_value=50.0)
+        later = tuple(replace(own, undetected_target_value=50.0) for own in OTHERS)
         evaluator = prepared(of, None, later, undetected() if hidden else None)
         every = evaluator.joint()(all_joint_actions((3, 3, 3))).mean(axis=1)
         evidence = Evidence(evaluator, (0, 1, 2), evaluator.joint())
@@ -315,7 +315,7 @@ def test_two_sensors_share_two_targets_far_off() -> None:
 
 @pytest.mark.parametrize("hidden", [False, True])
 def test_explanations_still_add_up(hidden: bool) -> None:
-    of = placed(bernoullis(FAR), POSES, undetected_worth=50.0 if hidden else 0.0)
+    of = placed(bernoullis(FAR), POSES, undetected_target_value=50.0 if hidden else 0.0)
     made = made_by(JointPlanner, of, undetected=undetected() if hidden else None)
     why = made.explain()
     assert why.of_targets is not None
@@ -335,7 +335,7 @@ def test_explanations_still_add_up(hidden: bool) -> None:
 
 @pytest.mark.parametrize("hidden", [False, True])
 def test_a_sequence_of_one_decision_is_a_single_one(hidden: bool) -> None:
-    of = placed(bernoullis(FAR), POSES, undetected_worth=50.0 if hidden else 0.0)
+    of = placed(bernoullis(FAR), POSES, undetected_target_value=50.0 if hidden else 0.0)
     searched = undetected() if hidden else None
     single = made_by(JointPlanner, of, undetected=searched)
     ahead = made_by(HorizonPlanner, of, undetected=searched, depth=1)

@@ -33,7 +33,7 @@ from vedette.scenarios.build import build_experiment, build_planner
 from vedette.simulation import simulate
 
 REWARDS = [CauchySchwarzReward(), KullbackLeiblerReward(), ExpectedLossReward()]
-SEARCHES = [BeamSearch(), BeamSearch(2), TreeSearch(), TreeSearch(rollout="kept", batch=1)]
+SEARCHES = [BeamSearch(), BeamSearch(2), TreeSearch(), TreeSearch(rollout="repeat_last", batch=1)]
 
 
 def lmbs(num_sensors: int = 2, **sensor: Any) -> Situation:

@@ -262,7 +262,7 @@ POCKET = (
 @pytest.mark.parametrize("budget", [2, 5, 100])
 def test_a_dead_end_is_not_entered(search: Any, budget: int) -> None:
     """To the east is a target, and behind it no way on, neither to the east nor to the north."""
-    given = scene([(0.0, 0.0)], [(100.0, 0.0)], (0.0, 90.0), stay=False)
+    given = scene([(0.0, 0.0)], [(100.0, 0.0)], (0.0, 90.0), allow_staying=False)
     assert single(given, POCKET).chosen_actions[0].tolist() == [100.0, 0.0]
     plan = decide(given, POCKET, depth=3, search=search, budget=budget, discount=0.9)
     assert plan.chosen_actions[0].tolist() == [0.0, 100.0]
@@ -277,7 +277,7 @@ def test_a_dead_end_is_not_entered(search: Any, budget: int) -> None:
 
 
 def test_a_dead_end_that_cannot_be_avoided_is_told_of() -> None:
-    given = scene([(0.0, 0.0)], [(100.0, 0.0)], (0.0,), stay=False)
+    given = scene([(0.0, 0.0)], [(100.0, 0.0)], (0.0,), allow_staying=False)
     plan = decide(given, POCKET, depth=3)
     assert told(plan) == (
         "sensor 1, decision 2 of the sequence: no course meets its constraints (keep_out, keep_out); "
@@ -310,7 +310,7 @@ class NotBothAt:
 @pytest.mark.parametrize("budget", [3, 12, 1000])
 def test_sensors_that_would_lock_each_other_in_keep_apart(search: Any, budget: int) -> None:
     """From where the targets are both could only go on to one place."""
-    given = scene([(0.0, 90.0), (0.0, -90.0)], [(100.0, 90.0), (100.0, -90.0)], (0.0, 180.0), stay=False)
+    given = scene([(0.0, 90.0), (0.0, -90.0)], [(100.0, 90.0), (100.0, -90.0)], (0.0, 180.0), allow_staying=False)
     constraints = (NotBothAt(250.0, 0.0, 100.0), OneWay())
     assert [row.tolist() for row in single(given, constraints).chosen_actions] == [[100.0, 0.0], [100.0, 0.0]]
     ahead = decide(given, constraints, depth=2, search=search, budget=budget, discount=0.9)
@@ -336,7 +336,7 @@ class OneWay:
 
 def test_pairs_that_cannot_go_on_are_told_of() -> None:
     """Both can only go east, and at the second step both are in the same rectangle."""
-    given = scene([(0.0, 90.0), (0.0, -90.0)], [(100.0, 90.0)], (0.0,), stay=False)
+    given = scene([(0.0, 90.0), (0.0, -90.0)], [(100.0, 90.0)], (0.0,), allow_staying=False)
     plan = decide(given, (NotBothAt(250.0, 0.0, 100.0),), depth=3)
     assert told(plan) == (
         "no joint sequence was found on which the sensors go together after decision 1; from there on that is given up",
@@ -345,7 +345,7 @@ def test_pairs_that_cannot_go_on_are_told_of() -> None:
 
 def test_two_that_must_not_both_avoid_a_dead_end() -> None:
     """East of both is a dead end, to the north not both may go: the pairs of the first decision come first."""
-    given = scene([(0.0, 0.0), (0.0, 0.0)], [(100.0, 0.0)], (0.0, 90.0), stay=False)
+    given = scene([(0.0, 0.0), (0.0, 0.0)], [(100.0, 0.0)], (0.0, 90.0), allow_staying=False)
     plan = decide(given, (*POCKET, NotBothAt(0.0, 100.0)), depth=2)
     assert [row.tolist() for row in plan.chosen_actions] != [[0.0, 100.0]] * 2
     mean = plan.tables[0].mean

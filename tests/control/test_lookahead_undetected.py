@@ -27,7 +27,7 @@ HEADINGS = (0.0, 90.0, 180.0)
 SPEED, PERIOD, RANGE, WORTH, CUTOFF = 100.0, 2.0, 100.0, 300.0, 100.0
 GRID = models.CellGrid.covering(models.Region(-700.0, 700.0, -700.0, 700.0), 50.0)
 STARTS = np.array([[0.0, 0.0, 0.0], [200.0, -250.0, 0.0]])
-ONE = replace(KNOWN, horizon_steps=1, horizon_period=PERIOD, undetected_worth=WORTH / CUTOFF)
+ONE = replace(KNOWN, horizon_steps=1, horizon_period=PERIOD, undetected_target_value=WORTH / CUTOFF)
 
 
 def sensors() -> Any:
@@ -80,7 +80,7 @@ def test_what_all_scans_are_expected_to_find_counts(depth: int, discount: float 
     assert plan.bound.upper == pytest.approx(mean.max(), rel=1e-10)
 
 
-@pytest.mark.parametrize("search", [BeamSearch(), TreeSearch(), TreeSearch(rollout="kept")], ids=repr)
+@pytest.mark.parametrize("search", [BeamSearch(), TreeSearch(), TreeSearch(rollout="repeat_last")], ids=repr)
 def test_what_no_single_decision_sees_is_found(search: Any) -> None:
     """They are expected where only two steps lead, one of them away from all others."""
     corner = np.linalg.norm(GRID.centres - [-400.0, 0.0], axis=1) < 80.0

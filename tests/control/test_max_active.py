@@ -21,7 +21,7 @@ from vedette.control import (
     RandomPlanner,
     Separation,
 )
-from vedette.control.baselines import FixedPlanner
+from vedette.control.baselines import ConstantPlanner
 from vedette.control.constraints import Active, Mask, nearest_feasible, relaxed
 from vedette.control.inputs import mask_of_decision, options_of
 from vedette.control.rewards import CauchySchwarzReward, ExpectedLossReward
@@ -93,7 +93,8 @@ def test_all_planners_keep_to_it_beside_other_constraints() -> None:
     example, both = switchable(shared(3)), (MaxActive(1), Separation(5.0))
     state, poses = example.arguments
     planners = [
-        RulePlanner(example.sensors, rule, example.settings, both) for rule in ("nearest", "assigned", "centroid")
+        RulePlanner(example.sensors, rule, example.settings, both)
+        for rule in ("nearest", "assigned_target", "centroid")
     ]
     for planner in planners:
         assert num_on(planner.plan(state, poses, rng=np.random.default_rng(0))) == 1
@@ -176,7 +177,7 @@ def vars_of(example: Situation) -> tuple[Any, ...]:
 
 def test_a_planner_that_keeps_to_no_constraints_is_watched() -> None:
     example = switchable(shared(3))
-    fixed = FixedPlanner((Actions.of(heading_deg=0.0, on=1.0),) * 3)
+    fixed = ConstantPlanner((Actions.of(heading_deg=0.0, on=1.0),) * 3)
     watched = ConstraintReportingPlanner(fixed, example.sensors, example.settings, (MaxActive(2),))
     plan = watched.plan(*example.arguments, rng=np.random.default_rng(0))
     assert plan.notes == ("3 sensors scan; expected at most 2",)

@@ -24,7 +24,7 @@ from control.examples import (
 from vedette import models
 from vedette.control import (
     CauchySchwarzReward,
-    FixedPlanner,
+    ConstantPlanner,
     IndependentPlanner,
     JointPlanner,
     Plan,
@@ -301,7 +301,7 @@ def test_random_control_takes_each_direction_equally_often() -> None:
 
 
 def test_a_fixed_action_is_kept() -> None:
-    planner = FixedPlanner((Actions.of(heading_deg=30.0), Actions.of(dx=-45.0, dy=1.0)))
+    planner = ConstantPlanner((Actions.of(heading_deg=30.0), Actions.of(dx=-45.0, dy=1.0)))
     plan = planner.plan(None, np.zeros((2, 3)), rng=np.random.default_rng(0))  # type: ignore[arg-type]
     assert [row.tolist() for row in plan.chosen_actions] == [[30.0], [-45.0, 1.0]]
     plan.validate()

@@ -65,7 +65,7 @@ def test_case_by_case_the_rewards_are_of_densities_fused_with_those_of_sensors_t
         np.testing.assert_allclose(table.mean, own.mean(axis=1), rtol=1e-9, atol=1e-9)
 
 
-@pytest.mark.parametrize("order", ["printed", "best_first"])
+@pytest.mark.parametrize("order", ["sensor_order", "best_first"])
 @pytest.mark.parametrize("kind", ["delta", "lmb"])
 def test_greedy_decides_one_by_one_while_the_undecided_stay(order: Any, kind: str) -> None:
     """By enumeration on the joint table; rewards may be of any kind."""
@@ -131,7 +131,7 @@ CAMERA = [0.0, 0.0, 0.5, np.radians(170.0), 0.3]
         (HeadingPlatform((5.0, 8.0), (0.0, 90.0)), [0.0, 0.0, 1.5], [90.0, 5.0]),
         (HeadingPlatform(0.0, (-20.0, 0.0, 20.0), relative=True), [0.0, 0.0, np.pi / 2], [90.0]),
         (GridPlatform(10.0, 5.0), [0.0, 0.0, 0.0], [0.0, 0.0]),
-        (GridPlatform(10.0, 5.0, stay=False), [0.0, 0.0, np.radians(50.0)], None),
+        (GridPlatform(10.0, 5.0, allow_staying=False), [0.0, 0.0, np.radians(50.0)], None),
         (Pointing((-170.0, 150.0)), CAMERA, [-170.0]),
         (MountedPlatform(GridPlatform(10.0, 5.0), Pointing((0.0, 160.0))), CAMERA, [0.0, 0.0, 160.0]),
     ],

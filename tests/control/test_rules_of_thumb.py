@@ -46,12 +46,12 @@ def nearest_heading(sensor: int, goal: Any) -> float:
 
 def test_every_sensor_heads_for_the_target_of_its_number() -> None:
     wanted = [nearest_heading(s, PLACES[s % 3]) for s in range(4)]
-    assert headings("assigned", belief()) == wanted
+    assert headings("assigned_target", belief()) == wanted
 
 
 def test_numbers_of_targets_may_be_given() -> None:
     wanted = [nearest_heading(s, PLACES[number]) for s, number in enumerate((2, 2, 0, 1))]
-    assert headings("assigned", belief(), targets=(3, 6, 1, 2)) == wanted
+    assert headings("assigned_target", belief(), targets=(3, 6, 1, 2)) == wanted
 
 
 def test_every_sensor_heads_for_its_nearest_that_no_other_took() -> None:
@@ -68,7 +68,7 @@ def test_all_head_for_the_centroid() -> None:
 
 
 def test_with_nobody_there_the_first_course_is_taken() -> None:
-    for rule in ("nearest", "assigned", "centroid"):
+    for rule in ("nearest", "assigned_target", "centroid"):
         assert headings(rule, belief([])) == [-180.0] * 4
         assert headings(rule, belief(existence=0.1)) == [-180.0] * 4
 
@@ -91,7 +91,7 @@ def test_a_camera_turns_to_its_target() -> None:
 def test_constraints_are_kept_to() -> None:
     fence, platform = StayInside(Region(-110.0, 110.0, -110.0, 110.0)), HeadingPlatform(10.0)
     different = 0
-    for rule in ("nearest", "assigned", "centroid"):
+    for rule in ("nearest", "assigned_target", "centroid"):
         free, held = headings(rule, belief(), platform), headings(rule, belief(), platform, constraints=(fence,))
         different += free != held
         for s, heading in enumerate(held):
@@ -102,10 +102,10 @@ def test_constraints_are_kept_to() -> None:
 
 def test_what_does_not_fit_is_refused() -> None:
     sensors = (mobile_sensor("lmb"),) * 2
-    with pytest.raises(InputError, match="rule: expected one of nearest, assigned, centroid; got far"):
+    with pytest.raises(InputError, match="rule: expected one of nearest, assigned_target, centroid; got far"):
         RulePlanner(sensors, "far")  # type: ignore[arg-type]
-    for rule, targets in (("nearest", (1, 2)), ("assigned", (1,))):
+    for rule, targets in (("nearest", (1, 2)), ("assigned_target", (1,))):
         with pytest.raises(InputError, match="targets: expected 2 numbers of targets"):
             RulePlanner(sensors, rule, targets=targets)  # type: ignore[arg-type]
     with pytest.raises(InputError, match=r"targets\[1\]: expected a whole number of at least 1"):
-        RulePlanner(sensors, "assigned", targets=(1, 0))
+        RulePlanner(sensors, "assigned_target", targets=(1, 0))

@@ -120,7 +120,7 @@ def test_later_decisions_of_a_sequence_count_on_later_scans() -> None:
 
 def test_who_does_not_scan_finds_nobody() -> None:
     undetected = UndetectedIntensity(CellGrid(Region(-500.0, 500.0, -500.0, 500.0), 10, 10), np.full(100, 0.05))
-    settings = PlanningSettings(undetected_worth=1e4, num_threads=1)
+    settings = PlanningSettings(undetected_target_value=1e4, num_threads=1)
     example = scanning(replace(shared(), settings=settings), None, [0.0, 1000.0])
     decides = JointPlanner(example.sensors, example.fusion, settings, ExpectedLossReward())
     state = replace(example.state, undetected=undetected)

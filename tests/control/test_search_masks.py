@@ -32,7 +32,7 @@ SEARCHES: tuple[JointSearch, ...] = (
     CoordinateAscent(),
     SequentialGreedy(),
     SequentialGreedy("best_first"),
-    CrossEntropy(num_samples=15, elite_share=0.2, smoothing=0.9),
+    CrossEntropy(num_samples=15, elite_fraction=0.2, smoothing=0.9),
     AutomaticSearch(),
 )
 
@@ -181,7 +181,7 @@ def test_lines_and_compiled_ascents_lead_where_evaluations_do(shape: Joint, seed
     assert len(compiled.asked) <= 4
 
 
-@pytest.mark.parametrize("order", ["printed", "best_first"])
+@pytest.mark.parametrize("order", ["sensor_order", "best_first"])
 @given(shape=SHAPES, seed=SEEDS)
 def test_greedy_has_half_of_the_best_and_as_much_as_it_says(order: Any, shape: Joint, seed: int) -> None:
     scene = watched(shape, seed)

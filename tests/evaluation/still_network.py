@@ -12,12 +12,12 @@ _SENSOR: dict[str, Any] = {
     "detection": {"kind": "constant", "probability": 0.95},
     "clutter": {"kind": "region", "rate": 3.0},
 }
-_BOAT: dict[str, Any] = {**_SENSOR, "platform": {"kind": "courses", "speed": 8.0}}
+_BOAT: dict[str, Any] = {**_SENSOR, "platform": {"kind": "heading", "speed": 8.0}}
 # Fields to set in `paper-a`. Bertha can only go where she does not leave the rectangle.
 STILL_NETWORK: dict[str, Any] = {
     "time.num_steps": 13,
-    "ospa.from_step": 1,
-    "ospa.to_step": 13,
+    "ospa.first_scan": 1,
+    "ospa.last_scan": 13,
     "filter.kind": "lmb",
     "fusion": {"kind": "sequential"},
     "sensors": [

@@ -23,7 +23,7 @@ DEGREES = np.arange(-180.0, 181.0, 30.0)
 ACTIONS = Actions(("heading_deg",), DEGREES[:, np.newaxis])
 DECISION_STEPS = (9, 19, 29)
 SPEED = 50.0
-NOISE = {"jdm": 6.0, "idm": 6.5, "random": 14.0, "fixed": 12.0}
+NOISE = {"jdm": 6.0, "idm": 6.5, "random": 14.0, "constant": 12.0}
 
 
 def make_truth(num_scans: int = 40) -> Truth:
@@ -90,7 +90,7 @@ def _move(planner: str, times: Floats, rng: np.random.Generator) -> tuple[Floats
         if moving:
             pose = pose + SPEED * np.c_[np.cos(pose[:, 2]), np.sin(pose[:, 2]), np.zeros(2)]
         poses[scan] = pose
-        if scan in DECISION_STEPS and planner != "fixed":
+        if scan in DECISION_STEPS and planner != "constant":
             plan = make_plan(planner, rng)
             decisions.append(Decision(scan + 1, float(time), pose.copy(), plan))
             pose = np.c_[pose[:, :2], np.deg2rad(plan.chosen_actions)]

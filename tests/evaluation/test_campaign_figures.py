@@ -109,7 +109,7 @@ def test_a_sweep_has_a_curve_a_strategy_with_confidence_intervals() -> None:
 def test_cost_is_a_median_with_a_range() -> None:
     seconds: dict[str, dict[str, Floats]] = {
         "jdm": {"filter": np.arange(1.0, 101.0), "planning": np.ones(3)},
-        "fixed": {"filter": np.full(4, 0.5)},
+        "constant": {"filter": np.full(4, 0.5)},
     }
     (axes,) = panels(cost_figure(seconds))
     np.testing.assert_allclose(axes.lines[0].get_xdata(), [50.5e3, 1e3])

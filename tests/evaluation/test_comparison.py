@@ -16,7 +16,7 @@ from vedette.evaluation.tail_summary import TailSummary, summarise_tail, tail_se
 from vedette.simulation.records import RunRecord
 
 NUM_RUNS = 6
-STRATEGIES = ("jdm", "idm", "random", "fixed")
+STRATEGIES = ("jdm", "idm", "random", "constant")
 
 
 @pytest.fixture(scope="module")
@@ -44,7 +44,7 @@ def test_the_start_of_the_time_window_can_be_set(runs: dict[str, list[RunRecord]
 
 
 def test_without_decisions_every_scan_counts(runs: dict[str, list[RunRecord]]) -> None:
-    assert compare({"fixed": runs["fixed"]}).counted.all()
+    assert compare({"constant": runs["constant"]}).counted.all()
 
 
 def test_differences_are_to_the_first_strategy_by_default(comparison: Comparison) -> None:
@@ -94,7 +94,7 @@ def test_decision_shares_add_up(comparison: Comparison) -> None:
     assert sum(shares.values()) == pytest.approx(1.0)
     assert list(shares.values()) == sorted(shares.values(), reverse=True)
     assert all(len(headings) == 2 for headings in shares)
-    assert comparison.decision_shares("fixed", 0) == {}
+    assert comparison.decision_shares("constant", 0) == {}
 
 
 def test_runs_that_are_not_paired_are_refused(runs: dict[str, list[RunRecord]]) -> None:
@@ -199,7 +199,7 @@ def test_benchmarks_show_tails_next_to_means() -> None:
 def test_csv_holds_the_unrounded_numbers(comparison: Comparison) -> None:
     rows = list(csv.DictReader(io.StringIO(strategy_csv(comparison))))
     assert float(rows[1]["total_mean_m"]) == float(comparison.summary("idm").mean)
-    assert float(rows[3]["share_won"]) == comparison.difference("fixed").win_rate
+    assert float(rows[3]["share_won"]) == comparison.difference("constant").win_rate
 
 
 def test_csv_has_no_name_that_a_spreadsheet_takes_for_a_formula(runs: dict[str, list[RunRecord]]) -> None:
@@ -213,4 +213,4 @@ def test_decision_rows_skip_strategies_without_decisions(comparison: Comparison)
     rows = decision_rows(comparison, "idm", at_most=1)
     assert [time for time, _ in rows] == ["10 s", "20 s", "30 s"]
     assert all(text.endswith("%") and "°" in text for _, text in rows)
-    assert decision_rows(comparison, "fixed") == []
+    assert decision_rows(comparison, "constant") == []

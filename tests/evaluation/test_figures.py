@@ -69,13 +69,13 @@ def test_tracks_of_two_runs_share_their_axes() -> None:
 
 
 def test_tracks_of_a_large_region_are_in_kilometres() -> None:
-    record = make_record("fixed")
+    record = make_record("constant")
     truth = replace(record.truth, states=record.truth.states * 20.0)
     assert labels(tracks_figure(replace(record, truth=truth))) == [("x (km)", "y (km)")]
 
 
 def test_tracks_without_any_target_or_estimate_can_be_drawn(tmp_path: Path) -> None:
-    record = make_record("fixed")
+    record = make_record("constant")
     none = replace(record.truth, offsets=np.zeros(41, np.int64), ids=np.empty(0, np.int64), states=np.empty((0, 4)))
     nothing = Estimate(np.empty((0, 2), np.int64), np.empty((0, 4)), np.empty((0, 4, 4)), np.empty(0))
     save_figure(

@@ -73,7 +73,7 @@ def test_by_hand() -> None:
 
 
 def test_labels_and_ids_make_the_tracks_of_a_run() -> None:
-    record = make_record("fixed", num_scans=14)
+    record = make_record("constant", num_scans=14)
     found: dict[Any, reference.Track] = {}
     true: dict[Any, reference.Track] = {}
     for scan, estimate in enumerate(record.estimates):

@@ -24,7 +24,7 @@ def scenario():
         ("decision_steps: [10, 20, 30]", "decision_steps: [8]"),
         ("num_samples: 40", "num_samples: 2"),
         ("horizon_steps: 5", "horizon_steps: 2"),
-        ("from_step: 11, to_step: 40", "from_step: 9, to_step: 12"),
+        ("first_scan: 11, last_scan: 40", "first_scan: 9, last_scan: 12"),
     ):
         assert old in text
         text = text.replace(old, new)
@@ -35,7 +35,7 @@ def scenario():
 def runs(scenario):
     return {
         name: [run_scenario(scenario, name, seed=5, run=run, num_threads=1) for run in range(2)]
-        for name in ("jdm", "idm", "still")
+        for name in ("jdm", "idm", "stationary")
     }
 
 
@@ -68,8 +68,8 @@ def test_the_scans_that_count_are_the_scenarios(scenario, runs):
 
 def test_the_typical_run_is_in_the_middle(scenario, runs):
     comparison = compare_scored_scans(scenario, ensembles_of(runs))
-    means = comparison.run_means("still")
-    assert typical_run(comparison, "still") == int(np.argmin(means))
+    means = comparison.run_means("stationary")
+    assert typical_run(comparison, "stationary") == int(np.argmin(means))
 
 
 def test_unknown_strategy(scenario):
@@ -78,10 +78,10 @@ def test_unknown_strategy(scenario):
 
 
 def test_a_scenario_may_be_named() -> None:
-    named = run_scenario("paper-a", "still", seed=3)
-    assert named.ospa.tobytes() == run_scenario(load_scenario("paper-a"), "still", seed=3).ospa.tobytes()
+    named = run_scenario("paper-a", "stationary", seed=3)
+    assert named.ospa.tobytes() == run_scenario(load_scenario("paper-a"), "stationary", seed=3).ospa.tobytes()
     with pytest.raises(InputError, match="paper-z"):
-        run_scenario("paper-z", "still", seed=3)
+        run_scenario("paper-z", "stationary", seed=3)
 
 
 def test_a_text_that_a_spreadsheet_would_take_for_a_formula_is_written_with_an_apostrophe() -> None:

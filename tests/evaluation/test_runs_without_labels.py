@@ -23,12 +23,12 @@ def with_filter(name: str, kind: str) -> Scenario:
 @pytest.mark.parametrize("kind", UNLABELLED)
 def test_a_run_names_its_estimates_anew_at_each_scan_and_can_be_stored(kind, tmp_path):
     scenario = with_filter("polar-10", kind)
-    record = run_scenario(scenario, "still", seed=3, run=1)
+    record = run_scenario(scenario, "stationary", seed=3, run=1)
     for scan, estimate in enumerate(record.estimates, start=1):
         estimate.validate()
         assert estimate.labels.tolist() == [[scan, i] for i in range(estimate.num_targets)]
     assert sum(estimate.num_targets for estimate in record.estimates) > 300
-    again = run_scenario(scenario, "fixed", seed=3, run=1)
+    again = run_scenario(scenario, "constant", seed=3, run=1)
     assert again.ospa.tobytes() == record.ospa.tobytes()
     back = load_run(save_run(record, tmp_path / "run"))
     assert back.ospa.tobytes() == record.ospa.tobytes()
@@ -51,7 +51,7 @@ def test_labelled_filters_are_better_on_the_same_scans(name):
     """Paired over runs: each filter without labels loses to the LMB filter by more than the scatter of runs allows."""
     mean_ospa = {
         kind: np.array(
-            [run_scenario(with_filter(name, kind), "still", seed=2, run=run).ospa[:, 0].mean() for run in range(8)]
+            [run_scenario(with_filter(name, kind), "stationary", seed=2, run=run).ospa[:, 0].mean() for run in range(8)]
         )
         for kind in ("delta_glmb", "lmb", *UNLABELLED)
     }

@@ -20,7 +20,7 @@ from vedette.scenarios.warnings import scenario_warnings
 
 def told(folder: Path) -> tuple[str, ...]:
     made = scenario_from_recording(folder / "radars.yaml", folder / "scans.csv")
-    return disagreement_warnings(run_scenario(made.scenario, "still", seed=0), made.scenario)
+    return disagreement_warnings(run_scenario(made.scenario, "stationary", seed=0), made.scenario)
 
 
 def rewritten(folder: Path, radar: str, change: Any) -> None:
@@ -52,7 +52,7 @@ def test_sensors_that_agree_give_no_warning(tmp_path: Path) -> None:
     write_recording(tmp_path)
     assert told(tmp_path) == ()
     scenario = load_scenario("paper-a")
-    assert disagreement_warnings(run_scenario(scenario, "still", seed=0), scenario) == ()
+    assert disagreement_warnings(run_scenario(scenario, "stationary", seed=0), scenario) == ()
 
 
 @pytest.mark.parametrize("change", [from_east, in_kilometres, other_longitude], ids=lambda each: each.__name__)

@@ -160,8 +160,8 @@ def test_a_hole_is_cut_out_whichever_way_round_it_is_given() -> None:
 def test_fields_and_degrees_are_drawn() -> None:
     changes = {"origin": {"lon": -1.2, "lat": 50.7}, "sensors.*.detection": SECTOR}
     scene = replace_fields(load_scenario("paper-a"), changes)
-    record = run_scenario(scene, "still", seed=0)
-    figure = tracks_figure(record, scene=build_scene(scene, "still"))
+    record = run_scenario(scene, "stationary", seed=0)
+    figure = tracks_figure(record, scene=build_scene(scene, "stationary"))
     (axes,) = figure.axes
     wedges = [patch for patch in axes.patches if isinstance(patch, Wedge)]
     assert [wedge.r for wedge in wedges] == [700.0, 700.0]

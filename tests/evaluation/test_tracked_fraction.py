@@ -62,8 +62,8 @@ def test_by_hand() -> None:
 
 def test_a_sensor_that_hardly_detects_sees_nothing() -> None:
     run = record_of(TRUTH, [[[-10.0, 3.0]]] * 4)
-    np.testing.assert_array_equal(TrackedFraction(BOTH, 2.0, 1.0, min_detection=0.7)(run)[:2], [1.0, 1.0])
-    seen = targets_in_view(TRUTH, run.poses, BOTH, min_detection=0.7)
+    np.testing.assert_array_equal(TrackedFraction(BOTH, 2.0, 1.0, min_detection_probability=0.7)(run)[:2], [1.0, 1.0])
+    seen = targets_in_view(TRUTH, run.poses, BOTH, min_detection_probability=0.7)
     assert seen.tolist() == [True, False, False, True, False, False, False]
 
 
@@ -99,7 +99,7 @@ def test_time_to_track_by_hand() -> None:
     run = record_of(truth, [[[0.0, 0.0]], [[35.0, 0.0]], [[9.0, 0.5]], [[20.0, 1.0]]])
     late = TimeToTrack(2.0, 1.0)(run)
     np.testing.assert_array_equal(late, [math.nan, (5.0 + 2.0) / 2.0, math.nan, math.nan])
-    np.testing.assert_array_equal(TimeToTrack(2.0, 1.0, from_step=1)(run)[:2], [(0.0 + 3.0) / 2.0, 3.5])
+    np.testing.assert_array_equal(TimeToTrack(2.0, 1.0, first_scan=1)(run)[:2], [(0.0 + 3.0) / 2.0, 3.5])
 
 
 def test_a_run_of_other_sensors_is_refused() -> None:
@@ -113,13 +113,13 @@ def test_a_scenario_names_it(tmp_path: Path) -> None:
     text = changed(
         (
             "ospa: {cutoff: 50.0",
-            "metrics: {share: {kind: tracked_share}, wait_s: {kind: time_to_track}}\nospa: {cutoff: 50.0",
+            "metrics: {share: {kind: tracked_fraction}, wait_s: {kind: time_to_track}}\nospa: {cutoff: 50.0",
         )
     )
     file = tmp_path / "f.yaml"
     file.write_text(text)
     scenario = load_scenario(file)
-    record = run_scenario(scenario, "still", seed=1)
+    record = run_scenario(scenario, "stationary", seed=1)
     columns = measure_run(record, scenario, custom_metrics(scenario)).columns()
     share = columns["share"]
     assert np.isnan(columns["wait_s"]).sum() == record.num_scans - 1  # one target, from the second scan on
@@ -132,25 +132,31 @@ def test_a_scenario_names_it(tmp_path: Path) -> None:
 
 def test_targets_in_view_are_those_of_the_true_sensors(tmp_path: Path) -> None:
     text = changed(
-        ("ospa: {cutoff: 50.0", "metrics: {share: {kind: tracked_share}}\nospa: {cutoff: 50.0"),
+        ("ospa: {cutoff: 50.0", "metrics: {share: {kind: tracked_fraction}}\nospa: {cutoff: 50.0"),
         (
             "sensor_defaults:\n",
-            "sensor_defaults:\n  truth: {detection: {kind: limited_range, probability: 0.9, max_range: 1.0}}\n",
+            "sensor_defaults:\n  true_parameters:\n"
+            "    detection: {kind: limited_range, probability: 0.9, max_range: 1.0}\n",
         ),
     )
     file = tmp_path / "f.yaml"
     file.write_text(text)
     scenario = load_scenario(file)
-    record = run_scenario(scenario, "still", seed=1)
+    record = run_scenario(scenario, "stationary", seed=1)
     # The filters believe that they see everywhere; in truth no target comes within a metre.
     assert np.isnan(measure_run(record, scenario, custom_metrics(scenario)).columns()["share"]).all()
 
 
 def test_a_mistake_in_it_is_placed(tmp_path: Path) -> None:
     text = changed(
-        ("ospa: {cutoff: 50.0", "metrics: {share: {kind: tracked_share, min_detection: 2}}\nospa: {cutoff: 50.0")
+        (
+            "ospa: {cutoff: 50.0",
+            "metrics: {share: {kind: tracked_fraction, min_detection_probability: 2}}\nospa: {cutoff: 50.0",
+        )
     )
     file = tmp_path / "f.yaml"
     file.write_text(text)
-    with pytest.raises(ScenarioError, match=r"metrics\.share\.min_detection: expected a number of at most 1, got 2"):
+    with pytest.raises(
+        ScenarioError, match=r"metrics\.share\.min_detection_probability: expected a number of at most 1, got 2"
+    ):
         load_scenario(file)

@@ -181,9 +181,9 @@ def test_gibbs_converges_to_ranked():
 @pytest.mark.slow
 def test_in_the_paper_scenario_the_bound_is_what_was_cut_off():
     """Much of a scan's weight lies in variations beyond the cap, however little they matter."""
-    fewer = {"time.num_steps": 14, "ospa.from_step": 1, "ospa.to_step": 14, "control.decision_steps": None}
+    fewer = {"time.num_steps": 14, "ospa.first_scan": 1, "ospa.last_scan": 14, "control.decision_steps": None}
     scenario = replace_fields(load_scenario("paper-a"), {**fewer, "filter.limits.max_hypotheses": 100})
-    record = run_scenario(scenario, "still", seed=0, run=1, num_threads=1)
+    record = run_scenario(scenario, "stationary", seed=0, run=1, num_threads=1)
     tracker: Any = build_sensors(scenario)[0].filter
     scans: Any = scans_of(record, build_experiment(scenario))
     every = replace(tracker, limits=replace(tracker.limits, max_hypotheses=10**6, min_relative_weight=1e-16))

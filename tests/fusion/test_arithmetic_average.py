@@ -63,7 +63,7 @@ def test_by_views_a_label_is_averaged_over_those_that_see_it() -> None:
     rng = np.random.default_rng(5)
     beliefs = [belief((0.9, 0.8), rng, (0, 1)), belief((0.6, 0.4), rng, (0, 2))]
     seen = views([0.9, constant_detection(0.3)])
-    fused, info = ArithmeticAverage((0.5, 0.5), by_views=True).fuse(beliefs, seen)
+    fused, info = ArithmeticAverage((0.5, 0.5), field_of_view_weighting=True).fuse(beliefs, seen)
     assert fused.tracks.labels.tolist() == [list(LABELS[0]), list(LABELS[2])]  # who sees the second lacks it
     np.testing.assert_allclose(fused.existence, [float(informed(0.9, 0.3) @ np.array([0.9, 0.6])), 0.4], rtol=1e-12)
     assert info.missing_labels == (0, 1)

@@ -34,7 +34,7 @@ def test_weights_are_those_of_the_detection_at_each_label() -> None:
     rng = np.random.default_rng(1)
     beliefs = [belief((0.9, 0.8, 0.3), rng), belief((0.95, 0.4, 0.7), rng)]
     seen = views([0.9, constant_detection(0.3)])
-    fused, info = Clmb((0.5, 0.5), by_views=True).fuse(beliefs, seen)
+    fused, info = Clmb((0.5, 0.5), field_of_view_weighting=True).fuse(beliefs, seen)
     fused.validate()
     own: Any = moments(fused)
     parts: Any = [moments(each) for each in beliefs]
@@ -49,10 +49,10 @@ def test_a_sensor_that_sees_the_place_and_lacks_the_label_has_its_floor() -> Non
     rng = np.random.default_rng(2)
     first, second = belief((0.9, 0.9), rng, (0, 1)), belief((0.8,), rng, (0,))
     seen = views([constant_detection(0.9), 0.6])
-    fused, info = Clmb((0.5, 0.5), by_views=True, missing_existence=1e-3).fuse([first, second], seen)
+    fused, info = Clmb((0.5, 0.5), field_of_view_weighting=True, missing_existence=1e-3).fuse([first, second], seen)
     assert fused.existence_logit[1] == pytest.approx(logit(0.9), rel=1e-12)
     assert info.missing_labels == (0, 0)
-    fused, info = Clmb((0.5, 0.5), by_views=True, missing_existence=1e-3).fuse(
+    fused, info = Clmb((0.5, 0.5), field_of_view_weighting=True, missing_existence=1e-3).fuse(
         [first, second], views([constant_detection(0.9), constant_detection(0.6)])
     )
     surer, other = informed(0.9, 0.6)
@@ -60,7 +60,7 @@ def test_a_sensor_that_sees_the_place_and_lacks_the_label_has_its_floor() -> Non
     assert info.missing_labels == (0, 1)
     np.testing.assert_allclose(fused.tracks.means[1], first.tracks.means[1], rtol=1e-12)
     # All that see the place lack the label: the floor, at the density of those that have it.
-    fused, _ = Clmb((0.5, 0.5), by_views=True, missing_existence=1e-3).fuse(
+    fused, _ = Clmb((0.5, 0.5), field_of_view_weighting=True, missing_existence=1e-3).fuse(
         [first, second], views([0.9, constant_detection(0.6)])
     )
     assert fused.existence_logit[1] == pytest.approx(logit(1e-3), rel=1e-12)
@@ -70,7 +70,7 @@ def test_a_sensor_that_sees_the_place_and_lacks_the_label_has_its_floor() -> Non
 def test_where_nobody_sees_those_that_have_the_label_keep_their_weights() -> None:
     rng = np.random.default_rng(3)
     beliefs = [belief((0.9, 0.6), rng, (0, 2)), belief((0.8, 0.5), rng, (0, 2)), belief((0.8,), rng, (0,))]
-    fused, info = Clmb((0.2, 0.3, 0.5), by_views=True).fuse(beliefs, views([0.9, 0.5, 0.7]))
+    fused, info = Clmb((0.2, 0.3, 0.5), field_of_view_weighting=True).fuse(beliefs, views([0.9, 0.5, 0.7]))
     parts = [moments(each)[LABELS[2]] for each in beliefs[:2]]
     expected = by_hand(np.array([0.4, 0.6]), *zip(*parts, strict=True))
     own: Any = moments(fused)[LABELS[2]]
@@ -84,11 +84,11 @@ def test_where_nobody_has_scanned_sensors_count_by_what_they_would_see(rule: Any
     rng = np.random.default_rng(8)
     beliefs = [belief((0.95, 0.9, 0.1), rng), belief((0.1, 0.2, 0.9), rng)]
     at = [PLACES[0, 0], PLACES[2, 0]]
-    expected, _ = rule((0.5, 0.5), by_views=True).fuse(beliefs, views([0.9, 0.9], at))
-    fused, _ = rule((0.5, 0.5), by_views=True).fuse(beliefs, views([0.9, 0.9], at, [False, False]))
+    expected, _ = rule((0.5, 0.5), field_of_view_weighting=True).fuse(beliefs, views([0.9, 0.9], at))
+    fused, _ = rule((0.5, 0.5), field_of_view_weighting=True).fuse(beliefs, views([0.9, 0.9], at, [False, False]))
     assert_same_bits(fused, expected)
     # The second has scanned, and does not see the first target.
-    fused, _ = rule((0.5, 0.5), by_views=True).fuse(beliefs, views([0.9, 0.9], at, [False, True]))
+    fused, _ = rule((0.5, 0.5), field_of_view_weighting=True).fuse(beliefs, views([0.9, 0.9], at, [False, True]))
     assert fused.existence[[0, 2]] == pytest.approx([0.95, 0.9])
 
 
@@ -98,7 +98,9 @@ def test_many_that_hardly_see_do_not_outvote_a_few_that_do(rule: Any) -> None:
     rng = np.random.default_rng(9)
     sees, hardly = belief((0.99, 0.99, 0.99), rng), belief((0.5,), rng, (1,))
     chances = [constant_detection(0.98)] * 2 + [constant_detection(0.2)] * 14
-    fused, info = rule(np.full(16, 1.0 / 16), by_views=True).fuse([sees] * 2 + [hardly] * 14, views(chances))
+    fused, info = rule(np.full(16, 1.0 / 16), field_of_view_weighting=True).fuse(
+        [sees] * 2 + [hardly] * 14, views(chances)
+    )
     assert (fused.existence > 0.95).all()
     assert (info.missing_labels, info.num_lost_labels) == ((0, 0, *(2,) * 14), 0)
 
@@ -107,7 +109,9 @@ def test_many_that_hardly_see_do_not_outvote_a_few_that_do(rule: Any) -> None:
 def test_one_that_misses_nothing_and_lacks_a_label_decides(rule: Any) -> None:
     rng = np.random.default_rng(10)
     beliefs = [belief((0.9,), rng, (0,)), belief((0.9,), rng, (1,))]
-    fused, _ = rule((0.5, 0.5), by_views=True).fuse(beliefs, views([constant_detection(0.5), constant_detection(1.0)]))
+    fused, _ = rule((0.5, 0.5), field_of_view_weighting=True).fuse(
+        beliefs, views([constant_detection(0.5), constant_detection(1.0)])
+    )
     assert fused.existence[fused.tracks.labels[:, 1] == 0] < 0.01
     assert np.isfinite(fused.existence_logit).all()
 
@@ -119,9 +123,9 @@ def test_a_blind_sensor_changes_nothing_to_the_last_bit(rule: Any, why: str) -> 
     beliefs = [belief((0.9, 0.8, 0.3), rng), belief((0.95, 0.4, 0.7), rng)]
     blind = BLIND if why == "sees nothing" else constant_detection(0.9)
     seen = views([0.9, constant_detection(0.6), blind], scanned=[True, True, why == "sees nothing"])
-    expected, _ = rule((0.5, 0.5), by_views=True).fuse(beliefs, views([0.9, constant_detection(0.6)]))
+    expected, _ = rule((0.5, 0.5), field_of_view_weighting=True).fuse(beliefs, views([0.9, constant_detection(0.6)]))
     for third in (belief((1.0 - 1e-9,) * 3, rng), belief((0.001,), rng, (1,)), LMB.empty(2)):
-        fused, _ = rule(QUARTERS, by_views=True).fuse([*beliefs, third], seen)
+        fused, _ = rule(QUARTERS, field_of_view_weighting=True).fuse([*beliefs, third], seen)
         assert_same_bits(fused, expected)
 
 
@@ -130,8 +134,10 @@ def test_the_order_of_sensors_and_many_blind_ones_change_nothing(rule: Any) -> N
     rng = np.random.default_rng(5)
     beliefs = [belief(rng.uniform(0.1, 0.9, 3).tolist(), rng) for _ in range(12)]
     detections = [constant_detection(0.8) if s in (2, 9) else BLIND for s in range(12)]
-    fused, _ = rule(np.full(12, 1.0 / 12), by_views=True).fuse(beliefs, views(detections))
-    two, _ = rule((0.5, 0.5), by_views=True).fuse([beliefs[2], beliefs[9]], views([constant_detection(0.8)] * 2))
+    fused, _ = rule(np.full(12, 1.0 / 12), field_of_view_weighting=True).fuse(beliefs, views(detections))
+    two, _ = rule((0.5, 0.5), field_of_view_weighting=True).fuse(
+        [beliefs[2], beliefs[9]], views([constant_detection(0.8)] * 2)
+    )
     np.testing.assert_allclose(fused.existence_logit, two.existence_logit, rtol=1e-12)
     np.testing.assert_allclose(fused.tracks.means, two.tracks.means, rtol=1e-12, atol=1e-12)
 
@@ -140,10 +146,10 @@ def test_the_order_of_sensors_and_many_blind_ones_change_nothing(rule: Any) -> N
 def test_certain_labels_and_sensors_of_weight_zero(rule: Any) -> None:
     rng = np.random.default_rng(6)
     sure, unsure = belief((1.0, 1.0, 1.0), rng), belief((0.2, 0.0, 0.3), rng)
-    fused, _ = rule((0.5, 0.5), by_views=True).fuse([unsure, sure], views([0.9, BLIND]))
+    fused, _ = rule((0.5, 0.5), field_of_view_weighting=True).fuse([unsure, sure], views([0.9, BLIND]))
     assert fused.existence[0] == pytest.approx(0.2)
     assert not np.isnan(fused.existence_logit).any()
-    fused, _ = rule((0.0, 1.0), by_views=True).fuse([unsure, sure], views([0.9, 0.9]))
+    fused, _ = rule((0.0, 1.0), field_of_view_weighting=True).fuse([unsure, sure], views([0.9, 0.9]))
     assert (fused.existence == 1.0).all()
 
 
@@ -160,12 +166,10 @@ def test_detection_is_the_mean_over_the_mixture_and_nothing_without_a_scan() -> 
 def test_views_that_are_missing_or_do_not_fit() -> None:
     rng = np.random.default_rng(7)
     beliefs = [belief((0.9,), rng, (0,))] * 2
-    with pytest.raises(
-        InputError, match=r"views: expected the views of the sensors, as the fusion .* by_views; got None"
-    ):
-        Clmb((0.5, 0.5), by_views=True).fuse(beliefs)
+    with pytest.raises(InputError, match=r"views: expected the fields of view .* field_of_view_weighting; got None"):
+        Clmb((0.5, 0.5), field_of_view_weighting=True).fuse(beliefs)
     with pytest.raises(InputError, match=r"views.sensors: expected 2, one for each fusion weight; got 3"):
-        Clmb((0.5, 0.5), by_views=True).fuse(beliefs, views([0.9] * 3))
+        Clmb((0.5, 0.5), field_of_view_weighting=True).fuse(beliefs, views([0.9] * 3))
     model = sensor(BLIND)
     with pytest.raises(InputError, match=r"views.sensors: expected at least one SensorModel"):
         FieldsOfView((), np.zeros((0, 3)), ())

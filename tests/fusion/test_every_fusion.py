@@ -224,7 +224,7 @@ def test_words_and_flags() -> None:
     given_words: list[tuple[Any, dict[str, Any], str]] = [
         *((rule, {"mixture_power": word}, "mixture_power") for rule in (Clmb, CmDeltaGlmb) for word in (["auto"], "x")),
         *(
-            (rule, {"by_views": "yes"}, "by_views: expected true or false; got yes")
+            (rule, {"field_of_view_weighting": "yes"}, "field_of_view_weighting: expected true or false; got yes")
             for rule in (Clmb, ArithmeticAverage)
         ),
     ]
@@ -281,10 +281,13 @@ def test_labels_out_of_order() -> None:
 
 def test_views_that_are_none() -> None:
     nobody, seen = [LMB.empty(4)] * 2, "views: expected a FieldsOfView; got bool"
-    for by_views in (Clmb(EQUAL, by_views=True), ArithmeticAverage(EQUAL, by_views=True)):
+    for field_of_view_weighting in (
+        Clmb(EQUAL, field_of_view_weighting=True),
+        ArithmeticAverage(EQUAL, field_of_view_weighting=True),
+    ):
         with pytest.raises(InputError, match=seen):
-            by_views.fuse(nobody, True)  # type: ignore[arg-type]
-        with pytest.raises(InputError, match="by_views; got None"):
-            by_views.fuse(nobody)
+            field_of_view_weighting.fuse(nobody, True)  # type: ignore[arg-type]
+        with pytest.raises(InputError, match="field_of_view_weighting; got None"):
+            field_of_view_weighting.fuse(nobody)
     with pytest.raises(InputError, match=r"views\.prediction: expected the LMB or FactoredGLMB"):
         ParallelUpdate().fuse(nobody, True)  # type: ignore[arg-type]

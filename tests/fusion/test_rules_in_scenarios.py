@@ -62,9 +62,9 @@ def found(scenario: Scenario) -> list[int]:
     ("fusion", "keeps"),
     [
         ("{kind: arithmetic_average}", False),
-        ("{kind: clmb, by_views: true}", True),
-        ("{kind: clmb, by_views: true, feedback: true}", True),
-        ("{kind: arithmetic_average, by_views: true}", True),
+        ("{kind: clmb, field_of_view_weighting: true}", True),
+        ("{kind: clmb, field_of_view_weighting: true, feedback: true}", True),
+        ("{kind: arithmetic_average, field_of_view_weighting: true}", True),
         ("{kind: parallel}", True),
     ],
 )
@@ -77,9 +77,9 @@ def test_what_one_sensor_sees_is_kept_by_views_and_by_the_parallel_update(fusion
     [
         "{kind: parallel}",
         "{kind: central}",
-        "{kind: clmb, by_views: true, feedback: true}",
-        "{kind: arithmetic_average, by_views: true, feedback: true}",
-        "{kind: clmb, by_views: true}",
+        "{kind: clmb, field_of_view_weighting: true, feedback: true}",
+        "{kind: arithmetic_average, field_of_view_weighting: true, feedback: true}",
+        "{kind: clmb, field_of_view_weighting: true}",
     ],
 )
 def test_the_default_filter_goes_with_every_rule(fusion: str) -> None:
@@ -108,7 +108,7 @@ def sixteen(fusion: dict[str, Any], outside: float = 0.0) -> Scenario:
 
 def mean_ospa(scenario: Scenario) -> float:
     """From the sixth scan on, of two runs."""
-    runs = [run_scenario(scenario, "still", seed=2, run=run, num_threads=1) for run in range(2)]
+    runs = [run_scenario(scenario, "stationary", seed=2, run=run, num_threads=1) for run in range(2)]
     return float(np.mean([record.ospa[5:, 0] for record in runs]))
 
 
@@ -120,7 +120,11 @@ def test_many_sensors_in_parallel_find_what_they_find_in_turn() -> None:
 @pytest.mark.parametrize("own", [True, False])
 def test_sensors_that_hardly_see_do_not_outvote_those_that_do(own: bool) -> None:
     """Filters that allow for a fifth of detections where there are none."""
-    fusion = {"kind": "clmb", "by_views": True, **({"matching": "assignment"} if own else {"feedback": True})}
+    fusion = {
+        "kind": "clmb",
+        "field_of_view_weighting": True,
+        **({"matching": "assignment"} if own else {"feedback": True}),
+    }
     assert mean_ospa(sixteen(fusion, 0.2)) < 25.0
 
 
@@ -159,7 +163,10 @@ def test_a_decision_of_matched_beliefs_goes_by_common_labels() -> None:
     [
         ("{kind: parallel}", None),
         ("{kind: sequential}", None),
-        ("{kind: clmb, by_views: true}", "take all scans in full; tracks are fused by another rule (clmb by views)"),
+        (
+            "{kind: clmb, field_of_view_weighting: true}",
+            "take all scans in full; tracks are fused by another rule (clmb by views)",
+        ),
         ("{kind: clmb, matching: assignment}", None),
     ],
 )

@@ -18,8 +18,8 @@ MEASURED = {"bearing_range": 2, "bearing_only": 1, "range_only": 1, "position": 
 OWN = Path(__file__).parents[1] / "scenarios"
 SHIPS = "time,id,x,y\n" + "".join(f"{2.0 * k},{ship},{9.0 * k},{50.0 * ship}\n" for k in range(12) for ship in (1, 2))
 STRATEGIES = (
-    *("jdm", "idm", "lookahead", "nearest", "assigned", "centroid"),
-    *("oracle", "told", "random", "fixed", "still"),
+    *("jdm", "idm", "lookahead", "nearest", "assigned_target", "centroid"),
+    *("oracle", "true_targets", "random", "constant", "stationary"),
 )
 
 
@@ -52,14 +52,14 @@ def combination(rng: Rng) -> Data:
     data["fusion"] = _fusion(rng, len(sensors), data["filter"]["kind"])
     data |= {
         "estimator": pick(rng, [{"kind": "map"}, {"kind": "map"}, {"kind": "marginal"}, own_part("sure")]),
-        "metrics": pick(rng, [{}, {"share": {"kind": "tracked_share"}}, {"count": own_part("count")}]),
+        "metrics": pick(rng, [{}, {"share": {"kind": "tracked_fraction"}}, {"count": own_part("count")}]),
     }
     if rng.random() < 0.25:
         data["network"] = _network(rng)
     if rng.random() < 0.3:
         data["undetected"] = _undetected(rng)
     elif rng.random() < 0.95:
-        data["control"].pop("undetected_worth", None)
+        data["control"].pop("undetected_target_value", None)
     if "lookahead" in data["control"] and rng.random() < 0.95:
         data["control"]["association"] = "known"
     return data
@@ -84,9 +84,12 @@ def _motion(rng: Rng, dim: int) -> Data:
         return own_model("motion", state_dim=3)
     if dim == 5:
         return {"kind": "coordinated_turn", "sigma_v": 1.0, **order}
-    return {"kind": "constant_velocity", "sigma_v": pick(rng, [0.0, 1.0]), "acceleration": "held", **order} | pick(
-        rng, [{}, {"acceleration": "continuous"}]
-    )
+    return {
+        "kind": "constant_velocity",
+        "sigma_v": pick(rng, [0.0, 1.0]),
+        "noise_model": "discrete_white",
+        **order,
+    } | pick(rng, [{}, {"noise_model": "continuous_white"}])
 
 
 def _birth(rng: Rng, dim: int, last: int, sensors: list[Data]) -> Data:
@@ -105,7 +108,12 @@ def _birth(rng: Rng, dim: int, last: int, sensors: list[Data]) -> Data:
 def _targets(rng: Rng, dim: int, last: int) -> Data:
     how = rng.random()
     if how < 0.15:
-        return {"kind": "crowd", "number": int(rng.integers(1, 6)), "std": [3.0] * (dim - 2), "death_probability": 0.1}
+        return {
+            "kind": "uniform",
+            "number": int(rng.integers(1, 6)),
+            "std": [3.0] * (dim - 2),
+            "death_probability": 0.1,
+        }
     if how < 0.3:
         std = [30.0, 30.0, 3.0, 3.0, 0.02][:dim]
         return {"kind": "poisson", "expected": 0.5, "mean": _vector(rng, dim), "std": std, "death_probability": 0.1}
@@ -139,11 +147,11 @@ def _sensor(rng: Rng) -> Data:
         "noise": _noise(rng, kind),
         "clutter": _clutter(rng, kind),
         "platform": platform,
-        "moves_from": pick(rng, ["first_decision", "start"]),
+        "stationary_until_first_decision": bool(rng.integers(2)),
         "detection": _detection(rng, platform),
     }
     if rng.random() < 0.2:
-        sensor["truth"] = pick(
+        sensor["true_parameters"] = pick(
             rng,
             [
                 {"noise": _noise(rng, kind)},
@@ -159,7 +167,7 @@ def _sensor(rng: Rng) -> Data:
     if rng.random() < 0.2:
         sensor["price"] = float(rng.uniform(-1.0, 3.0))
     if rng.random() < 0.1:
-        sensor.setdefault("scans", {})["late"] = {"up_to": 1.0, "share": 0.5}
+        sensor.setdefault("scans", {})["late"] = {"max_delay": 1.0, "probability": 0.5}
     return sensor
 
 
@@ -167,7 +175,7 @@ def _noise(rng: Rng, kind: str) -> Data:
     if kind == "custom":
         return pick(rng, [own_model("noise"), {"kind": "constant", "std": [2.0]}])
     std = {"bearing_range": [0.02, 5.0], "bearing_only": [0.02], "range_only": [5.0], "position": [5.0, 5.0]}[kind]
-    grown = {"kind": "by_axis", "std": [3.0, 3.0], "growth": [1e-4, 0.0]}
+    grown = {"kind": "by_axis", "std": [3.0, 3.0], "quadratic_growth": [1e-4, 0.0]}
     other = grown if kind == "position" else {"kind": "range_dependent"}
     return pick(rng, [{"kind": "constant", "std": std}, other])
 
@@ -192,17 +200,23 @@ def _clutter(rng: Rng, kind: str) -> Data:
 def _platform(rng: Rng) -> Data:
     headings = [-90.0, 0.0, 90.0]
     carriers: list[Data] = [
-        {"kind": "still"},
-        {"kind": "courses", "speed": 5.0, "headings_deg": headings, "relative": bool(rng.integers(2))},
-        {"kind": "courses", "speeds": [0.0, 5.0], "headings_deg": headings},
-        {"kind": "steps", "length": 10.0, "speed": 20.0, "directions_deg": headings, "stay": bool(rng.integers(2))},
+        {"kind": "stationary"},
+        {"kind": "heading", "speed": 5.0, "headings_deg": headings, "relative": bool(rng.integers(2))},
+        {"kind": "heading", "speeds": [0.0, 5.0], "headings_deg": headings},
+        {
+            "kind": "grid_moves",
+            "length": 10.0,
+            "speed": 20.0,
+            "directions_deg": headings,
+            "allow_staying": bool(rng.integers(2)),
+        },
         {"kind": "waypoints", "points": [[0.0, 0.0], [90.0, 50.0]], "speed": 5.0, "closed": bool(rng.integers(2))},
         own_part("Hopper"),
     ]
     if rng.random() < 0.8:
         return pick(rng, carriers)
     zooms: Data = pick(rng, [{}, {"half_widths_deg": [20.0, 60.0]}, {"turn_rate_deg": 20.0}, {"relative": True}])
-    carrier: Data = pick(rng, [{}, {"carrier": pick(rng, carriers)}])
+    carrier: Data = pick(rng, [{}, {"platform": pick(rng, carriers)}])
     return {"kind": "camera", "half_width_deg": 40.0, "pointings_deg": [0.0, 120.0], **zooms, **carrier}
 
 
@@ -218,7 +232,7 @@ def _detection(rng: Rng, platform: Data) -> Data:
         {"kind": "limited_range", **near, "outside": pick(rng, [0.0, 0.2])},
         {"kind": "limited_sector", **near, "half_width_deg": 60.0},
         {**soft, "half_width_deg": 60.0, "angle_slope": pick(rng, [None, 10.0])},
-        {**soft, "cut": True},
+        {**soft, "hard_limit": True},
         own_model("detection"),
     ]
     return pick(rng, kinds)
@@ -253,7 +267,7 @@ def _fusion(rng: Rng, num_sensors: int, filters: str) -> Data:
     if kind in ("clmb", "cm_delta_glmb", "arithmetic_average"):
         made["feedback"] = bool(rng.random() < 0.4)
         made["matching"] = pick(rng, ["labels", "assignment"])
-        made["by_views"] = bool(rng.random() < 0.3) and kind != "cm_delta_glmb"
+        made["field_of_view_weighting"] = bool(rng.random() < 0.3) and kind != "cm_delta_glmb"
     if rng.random() < 0.3:
         made["weights"] = [1.0 / num_sensors] * num_sensors
     if rng.random() < 0.3:
@@ -263,12 +277,19 @@ def _fusion(rng: Rng, num_sensors: int, filters: str) -> Data:
 
 
 def _network(rng: Rng) -> Data:
-    network: Data = pick(rng, [{}, {"hops": 1}, {"delay": 1}, {"consensus_rounds": 2}, {"loss": 0.5}])
+    network: Data = pick(
+        rng, [{}, {"max_hops": 1}, {"delay": 1}, {"consensus_rounds": 2}, {"link_loss_probability": 0.5}]
+    )
     return {**network, **pick(rng, [{}, {"radio_range": 400.0}])}
 
 
 def _undetected(rng: Rng) -> Data:
-    made: Data = {"cell": 100.0, "expected": 3.0, "speed": 2.0, "enters": pick(rng, ["anywhere", "border"])}
+    made: Data = {
+        "cell_size": 100.0,
+        "expected": 3.0,
+        "speed": 2.0,
+        "birth_density": pick(rng, ["uniform", "boundary"]),
+    }
     return {**made, **pick(rng, [{}, {"birth_rate": 0.1}, {"survival": 0.9}, {"region": REGION}])}
 
 
@@ -290,7 +311,7 @@ def _control(rng: Rng, last: int) -> Data:
     if rng.random() < 0.2:
         control |= {"confidence": 0.6, "max_samples": 24, "indifference": pick(rng, [0.0, 0.1])}
     if rng.random() < 0.2:
-        control["undetected_worth"] = 2.0
+        control["undetected_target_value"] = 2.0
     if rng.random() < 0.3:
         control["lookahead"] = _lookahead(rng)
     if rng.random() < 0.3:
@@ -300,7 +321,7 @@ def _control(rng: Rng, last: int) -> Data:
 
 def _lookahead(rng: Rng) -> Data:
     made: Data = {"depth": int(rng.integers(1, 3)), "discount": pick(rng, [None, 0.9]), "budget": pick(rng, [4, 200])}
-    how: Data = pick(rng, [{}, {"method": "beam", "beam_width": 2}, {"method": "tree", "rollout": "kept"}])
+    how: Data = pick(rng, [{}, {"method": "beam", "beam_width": 2}, {"method": "tree", "rollout": "repeat_last"}])
     return {**made, **how, **pick(rng, [{}, {"period": 2.0}])}
 
 
@@ -331,7 +352,7 @@ def _search(rng: Rng) -> Data:
             {"kind": "automatic"},
             {"kind": "exhaustive"},
             {"kind": "coordinate_ascent", "num_restarts": 1},
-            {"kind": "sequential_greedy", "order": pick(rng, ["printed", "best_first"])},
+            {"kind": "sequential_greedy", "order": pick(rng, ["sensor_order", "best_first"])},
             {"kind": "cross_entropy", "num_samples": 5, "max_rounds": 2},
             own_part("FirstOfAll"),
         ],
@@ -362,7 +383,7 @@ def _planner(rng: Rng) -> Data:
     if how < 0.7:
         return {"kind": "independent", **pick(rng, [{}, {"reward": _reward(rng)}])}
     if how < 0.85:
-        return {"kind": pick(rng, ["nearest", "assigned", "centroid"])}
+        return {"kind": pick(rng, ["nearest", "assigned_target", "centroid"])}
     if how < 0.95:
         return {"kind": "oracle", "depth": int(rng.integers(1, 3))}
     return own_part("Last")
@@ -370,4 +391,4 @@ def _planner(rng: Rng) -> Data:
 
 def _ospa(rng: Rng, last: int) -> Data:
     made: Data = {"components": pick(rng, ["position", "position", "state"]), "order": pick(rng, [1.0, 2.0])}
-    return {**made, **pick(rng, [{}, {"cutoff": 20.0}, {"from_step": 2, "to_step": last}, {"window": 2}])}
+    return {**made, **pick(rng, [{}, {"cutoff": 20.0}, {"first_scan": 2, "last_scan": last}, {"window": 2}])}

@@ -33,7 +33,7 @@ JUNK: list[Any] = [
         "reference",
         "2024-01-01T00:00:00Z",
         "jdm",
-        "still",
+        "stationary",
         "planner",
         "paper-a",
         "sensors.*.clutter.rate",

@@ -49,7 +49,7 @@ def _models() -> Iterator[tuple[str, Made]]:
     box = {"rate": 2.0, "low": [-3.0, 0.0], "high": [3.0, 100.0], "angular": [True, False]}
     given: list[tuple[Callable[..., Any], Data]] = [
         (models.Region, {"x_min": 0.0, "x_max": 1.0, "y_min": 0.0, "y_max": 1.0}),
-        (models.constant_velocity, {"sigma_v": 1.0, "acceleration": "held", "method": "auto"}),
+        (models.constant_velocity, {"sigma_v": 1.0, "noise_model": "discrete_white", "method": "auto"}),
         (models.coordinated_turn, {"sigma_v": 1.0, "sigma_turn_rate": 0.1, "method": "auto"}),
         (models.constant_survival, {"prob_survival": 0.9}),
         (models.constant_detection, {"prob_detection": 0.9}),
@@ -59,7 +59,7 @@ def _models() -> Iterator[tuple[str, Made]]:
         (models.soft_sector, {"prob_detection": 0.9, "max_range": 9.0, "half_width_rad": 0.5, "range_slope": 1.0}),
         (models.camera, {"prob_detection": 0.9, "max_range": 100.0, "reference_half_width_rad": 0.5}),
         (models.constant_noise, {"stds": [0.1, 2.0]}),
-        (models.axis_noise, {"std": [1.0, 2.0], "growth": [0.0, 0.1]}),
+        (models.axis_noise, {"std": [1.0, 2.0], "quadratic_growth": [0.0, 0.1]}),
         (
             models.range_dependent_noise,
             {"sigma_range": 1.0, "eta_range": 0.0, "sigma_bearing": 0.1, "eta_bearing": 0.0},
@@ -72,7 +72,7 @@ def _models() -> Iterator[tuple[str, Made]]:
         (models.CellGrid.covering, {"region": region, "cell": 20.0}),
         (models.CellGrid, {"region": region, "columns": 3, "rows": 3}),
         (platforms.HeadingPlatform, {"speed": 5.0, "headings_deg": [0.0, 90.0], "relative": False}),
-        (platforms.GridPlatform, {"length": 5.0, "speed": 5.0, "directions_deg": [0.0, 90.0], "stay": True}),
+        (platforms.GridPlatform, {"length": 5.0, "speed": 5.0, "directions_deg": [0.0, 90.0], "allow_staying": True}),
         (platforms.Waypoints, {"points": [[0.0, 0.0], [1.0, 1.0]], "speed": 5.0, "closed": False}),
         (
             platforms.Pointing,
@@ -133,7 +133,7 @@ def _fusions() -> Iterator[tuple[str, Made]]:
                 "mixture_power": "auto",
                 "missing_existence": 1e-4,
                 "limits": FusionLimits(),
-                "by_views": True,
+                "field_of_view_weighting": True,
             },
             (fuse,),
         ),
@@ -148,7 +148,11 @@ def _fusions() -> Iterator[tuple[str, Made]]:
     )
     yield (
         "ArithmeticAverage",
-        Made(fusion.ArithmeticAverage, {"weights": weights, "by_views": True, "limits": FusionLimits()}, (fuse,)),
+        Made(
+            fusion.ArithmeticAverage,
+            {"weights": weights, "field_of_view_weighting": True, "limits": FusionLimits()},
+            (fuse,),
+        ),
     )
     yield (
         "ParallelUpdate",
@@ -184,7 +188,7 @@ def _trackers() -> Iterator[tuple[str, Made]]:
     rule, network = fusion.Clmb((0.5, 0.5)), tracking.Network(100.0)
     central = filters.SequentialLmbFilter(targets(), (sensor(), sensor()))
     region = models.Region(-100.0, 100.0, -100.0, 100.0)
-    undetected = models.UndetectedModel(models.CellGrid.covering(region, 20.0), 1.0, 0.1, "anywhere", 1.0)
+    undetected = models.UndetectedModel(models.CellGrid.covering(region, 20.0), 1.0, 0.1, "uniform", 1.0)
     given: list[tuple[Any, Data]] = [
         (tracking.Distributed, {"filters": (local, local), "fusion": rule, "feedback": True, "min_detection": 0.1}),
         (tracking.Central, {"filter": central}),
@@ -197,7 +201,10 @@ def _trackers() -> Iterator[tuple[str, Made]]:
         yield make.__name__, Made(make, arguments, (("step", {"state": state, **scans}),))
     yield (
         "Network",
-        Made(tracking.Network, {"radio_range": 9.0, "hops": None, "loss": 0.1, "delay": 0, "consensus_rounds": None}),
+        Made(
+            tracking.Network,
+            {"radio_range": 9.0, "max_hops": None, "link_loss_probability": 0.1, "delay": 0, "consensus_rounds": None},
+        ),
     )
 
 
@@ -217,7 +224,7 @@ def _control() -> Iterator[tuple[str, Made]]:
             {**shared, "depth": 2, "period": 2.0, "search": control.BeamSearch(), "budget": 9, "discount": 0.5},
         ),
         (control.RandomPlanner, {name: shared[name] for name in ("sensors", "settings", "constraints")}),
-        (control.FixedPlanner, {"actions": (platforms.Actions.of(heading_deg=30.0),) * 2}),
+        (control.ConstantPlanner, {"actions": (platforms.Actions.of(heading_deg=30.0),) * 2}),
     ]
     for make, arguments in planners:
         yield make.__name__, Made(make, arguments, (plan,))
@@ -227,8 +234,8 @@ def _control() -> Iterator[tuple[str, Made]]:
         (control.AutomaticSearch, {"max_joint_actions": 9}),
         (control.ExhaustiveSearch, {"max_joint_actions": 9}),
         (control.CoordinateAscent, {"num_restarts": 1}),
-        (control.SequentialGreedy, {"order": "printed"}),
-        (control.CrossEntropy, {"num_samples": 9, "elite_share": 0.1, "smoothing": 0.5, "max_rounds": 3}),
+        (control.SequentialGreedy, {"order": "sensor_order"}),
+        (control.CrossEntropy, {"num_samples": 9, "elite_fraction": 0.1, "smoothing": 0.5, "max_rounds": 3}),
         (control.BeamSearch, {"beam_width": 3}),
         (control.TreeSearch, {"exploration": 0.3, "rollout": "random"}),
         (control.CauchySchwarzReward, {"unit_volume": 1.0}),

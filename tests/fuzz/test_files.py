@@ -109,7 +109,7 @@ def check_accepted(scenario: Scenario) -> None:
 
 def planners(scenario: Scenario) -> list[str]:
     unlabelled = scenario.model.filter.kind in ("phd", "cphd", "cb_member")
-    return ["random", "fixed", "still"] + ([] if unlabelled else ["jdm", "idm"])
+    return ["random", "constant", "stationary"] + ([] if unlabelled else ["jdm", "idm"])
 
 
 def test_scenario_files(try_cases: TryCases, folder: Path) -> None:
@@ -240,7 +240,8 @@ def test_fields_set_by_path(try_cases: TryCases, folder: Path) -> None:
 
 CAMPAIGNS = [path.read_text() for path in sorted(Path(__file__).parents[2].glob("examples/campaigns/*.toml"))]
 CAMPAIGNS += [
-    'name = "own"\nscenarios = ["small.yaml"]\nplanners = ["random", "still"]\nruns = 2\nset = {"ospa.cutoff" = 20}\n'
+    'name = "own"\nscenarios = ["small.yaml"]\nplanners = ["random", "stationary"]\nruns = 2\n'
+    'set = {"ospa.cutoff" = 20}\n'
     '[grid]\n"sensors.*.platform.speed" = [1.0, 2.0]\n[[variants]]\nname = "a"\nset = {"control.num_samples" = 3}\n'
     '[[variants]]\nname = "b"\n',
     'name = "times"\nscenarios = ["small.yaml"]\nruns = 2\n[grid]\n"time.start" = [1e400, inf, nan, 2024-01-01]\n',

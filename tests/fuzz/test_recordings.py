@@ -31,7 +31,7 @@ from vedette.scenarios.from_recording import scenario_from_recording
 
 TryCases = Callable[[Callable[[np.random.Generator], object], int], None]
 RADAR = """origin: {lon: -1.1171, lat: 50.7865}
-recording: {gather: 3.5}
+recording: {scan_window: 3.5}
 sensors:
   - {name: 1/2, position: [0, 0], detection: {kind: constant, probability: 0.95}, clutter: {kind: region, rate: 0.5}}
 """

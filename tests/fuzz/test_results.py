@@ -63,7 +63,7 @@ class Originals:
 @pytest.fixture(scope="module")
 def originals(tmp_path_factory: pytest.TempPathFactory) -> Originals:
     place = tmp_path_factory.mktemp("originals")
-    fields = {"time.num_steps": SCANS, "control.decision_steps": [10, 20], "ospa.to_step": SCANS}
+    fields = {"time.num_steps": SCANS, "control.decision_steps": [10, 20], "ospa.last_scan": SCANS}
     campaign = make_campaign(grid={}, runs=2, set=fields)
     with Store.open(place / "results", campaign) as store:
         for cell, run in campaign.tasks:

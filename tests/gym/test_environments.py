@@ -38,7 +38,7 @@ def scene(name: str) -> Scenario:
         return replace_fields(paper, {**ALONE, "sensors": first})
     fields: dict[str, dict[str, Any]] = {
         "lmb": LMBS,
-        "one moves": {**LMBS, "sensors.1.platform": {"kind": "still"}},
+        "one moves": {**LMBS, "sensors.1.platform": {"kind": "stationary"}},
         "fenced": {**LMBS, **FENCED},
     }
     return replace_fields(paper, fields[name]) if name in fields else load_scenario(name)
@@ -323,7 +323,7 @@ def test_wrong_actions_and_steps_are_told() -> None:
     episode(env)
     with pytest.raises(InputError, match="step: expected a reset first, as the run is over"):
         env.step([0, 0])
-    still = replace_fields(scene("lmb"), {"sensors.*.platform": {"kind": "still"}})
+    still = replace_fields(scene("lmb"), {"sensors.*.platform": {"kind": "stationary"}})
     with pytest.raises(InputError, match="sensors: expected one with a choice of actions at least; got none"):
         ScenarioEnv(still)
     alone = ScenarioEnv(scene("alone"), reward="expected_loss")

@@ -23,7 +23,7 @@ sensor_defaults:
   noise: {kind: constant, std: [10.0, 10.0]}
   detection: {kind: constant, probability: 0.9}
   clutter: {kind: region, rate: 1.0}
-  platform: {kind: courses, speed: 5.0}
+  platform: {kind: heading, speed: 5.0}
 sensors: [{position: [0.0, 0.0]}, {position: [100.0, 0.0]}]
 filter: {kind: lmb}
 """

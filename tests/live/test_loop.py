@@ -192,7 +192,7 @@ def test_the_decision_times_of_a_scenario_are_kept(tmp_path: Path) -> None:
     text = SYNCHRONOUS + "time: {num_steps: 20, start: 0.0}\ncontrol: {decision_steps: [4, 8]}\n"
     answers = [json.loads(answer) for answer in answered(small(tmp_path, text), walk(12))]
     assert [answer["plan"]["time"] for answer in answers if "plan" in answer] == [3.0, 7.0]
-    still = [json.loads(answer) for answer in answered(small(tmp_path, text, planner="still"), walk(12))]
+    still = [json.loads(answer) for answer in answered(small(tmp_path, text, planner="stationary"), walk(12))]
     assert not any("plan" in answer for answer in still)
 
 
@@ -282,7 +282,7 @@ def test_an_unsuitable_file_is_reported(tmp_path: Path, text: str, words: str) -
 
 
 def test_planners_that_need_the_true_targets_are_rejected(tmp_path: Path) -> None:
-    for name in ("oracle", "told"):
+    for name in ("oracle", "true_targets"):
         with pytest.raises(InputError, match=f"expected one that does not know the targets; got {name}"):
             small(tmp_path, decide_every=5.0, planner=name)
 

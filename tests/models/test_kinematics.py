@@ -37,7 +37,7 @@ def test_constant_velocity_is_the_papers(dt):
 
 @pytest.mark.parametrize("dt", [0.1, 1.0, 2.0])
 def test_a_continuous_acceleration_has_the_noise_of_all_moments(dt):
-    motion = models.constant_velocity(3.0, acceleration="continuous")
+    motion = models.constant_velocity(3.0, noise_model="continuous_white")
     identity = np.eye(2)
     noise = 9.0 * np.block([[dt**3 / 3 * identity, dt**2 / 2 * identity], [dt**2 / 2 * identity, dt * identity]])
     np.testing.assert_allclose(motion.noise_cov(STATES[0], dt), noise, rtol=1e-15)

@@ -148,7 +148,7 @@ def logistic(exponent):
 @pytest.mark.parametrize("half_width", [0.8, math.pi])
 def test_a_soft_sector_falls_off_at_its_edges(half_width, cut):
     off_axis = np.abs(np.angle(np.exp(1j * (BEARINGS - POSE[2]))))
-    detection = models.soft_sector(0.9801, 900.0, half_width, range_slope=0.01, angle_slope=20.0, cut=cut)
+    detection = models.soft_sector(0.9801, 900.0, half_width, range_slope=0.01, angle_slope=20.0, hard_limit=cut)
     expected = 0.9801 * logistic(0.01 * (RANGES - 900.0)) * logistic(20.0 * (off_axis - half_width))
     if cut:
         expected = np.where((off_axis <= half_width) & (RANGES <= 900.0), expected, 0.0)

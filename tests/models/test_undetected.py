@@ -63,7 +63,7 @@ def test_who_stands_still_stays() -> None:
 
 def test_prediction_is_the_map_of_all_pairs_of_cells() -> None:
     rng = np.random.default_rng(1)
-    model = UndetectedModel(GRID, rng.uniform(0.0, 2.0, 24), birth_rate=0.3, enters="border", speed=9.0)
+    model = UndetectedModel(GRID, rng.uniform(0.0, 2.0, 24), birth_rate=0.3, birth_density="boundary", speed=9.0)
     at_first = model.initial()
     survival, dt = rng.uniform(0.5, 1.0, 24), 2.0
     expected = model.births(dt)
@@ -115,7 +115,7 @@ def test_who_enters_at_the_border_appears_along_it(columns: int, rows: int) -> N
         for c in range(columns):
             lengths[r, c] = width * ((r == 0) + (r == rows - 1)) + height * ((c == 0) + (c == columns - 1))
     assert lengths.sum() == pytest.approx(2 * (240.0 + 80.0))
-    born = UndetectedModel(grid, 0.0, birth_rate=0.2, enters="border").births(3.0)
+    born = UndetectedModel(grid, 0.0, birth_rate=0.2, birth_density="boundary").births(3.0)
     np.testing.assert_allclose(born, 0.6 * lengths.ravel() / lengths.sum(), rtol=1e-12)
     anywhere = UndetectedModel(grid, 0.0, birth_rate=0.2).births(3.0)
     np.testing.assert_allclose(anywhere, np.full(columns * rows, 0.6 / (columns * rows)), rtol=1e-14)
@@ -165,7 +165,10 @@ BAD: list[tuple[Any, str]] = [
     (lambda: UndetectedModel(GRID, np.full(24, np.nan)), "UndetectedModel.expected: expected finite numbers"),
     (lambda: UndetectedModel(GRID, 1.0, birth_rate=-1.0), "UndetectedModel.birth_rate: expected a number of at least"),
     (lambda: UndetectedModel(GRID, 1.0, speed=math.inf), "UndetectedModel.speed: expected a finite number; got inf"),
-    (lambda: UndetectedModel(GRID, 1.0, enters="sea"), "UndetectedModel.enters: expected anywhere or border; got sea"),  # type: ignore[arg-type]
+    (
+        lambda: UndetectedModel(GRID, 1.0, birth_density="sea"),
+        "UndetectedModel.birth_density: expected uniform or boundary; got sea",
+    ),  # type: ignore[arg-type]
     (lambda: UndetectedModel(GRID, 1.0, survival=1.5), "UndetectedModel.survival: expected a probability"),
     (lambda: UndetectedModel(GRID, 1.0).predict(np.zeros(24), -1.0, 1.0), "dt: expected a number of at least 0"),
 ]

@@ -37,7 +37,7 @@ def test_to_stay_is_an_action_that_keeps_the_heading():
     platform = GridPlatform(100.0, 40.0)
     assert platform.actions(POSE).shape == (9, 2)
     np.testing.assert_array_equal(platform.course(POSE, platform.actions(POSE)[-1], TIMES), np.tile(POSE, (5, 1)))
-    assert GridPlatform(100.0, 40.0, (0.0,), stay=False).actions(POSE).tolist() == [[100.0, 0.0]]
+    assert GridPlatform(100.0, 40.0, (0.0,), allow_staying=False).actions(POSE).tolist() == [[100.0, 0.0]]
 
 
 POINTS = [[10.0, 15.0], [40.0, 15.0], [40.0, 15.0], [40.0, -25.0]]

@@ -83,6 +83,6 @@ def test_the_library_is_as_good_on_the_published_scene() -> None:
             scans = simulate_scans(states, experiment.poses, experiment.tracker.sensors, rngs=rngs)
             tracks = plain.step(tracks, world(), SENSORS, [scan.measurements for scan in scans], plain.Caps())
             errors.append(ospa(plain.estimates(tracks), states, cutoff=5.0, order=2.0).total)
-        ours = run_scenario(scenario, "still", seed=0, run=run).ospa[:, 0].mean()
+        ours = run_scenario(scenario, "stationary", seed=0, run=run).ospa[:, 0].mean()
         differences.append(np.mean(errors) - ours)
     assert abs(np.mean(differences)) < 0.08  # 0.02 with a standard error of 0.007 over five runs

@@ -35,8 +35,8 @@ SUMS: dict[str, Any] = {
     "filter.kind": "lmb",
     "fusion.kind": "clmb",
     "time.num_steps": 13,
-    "ospa.from_step": 1,
-    "ospa.to_step": 13,
+    "ospa.first_scan": 1,
+    "ospa.last_scan": 13,
     "control.decision_steps": [10, 12],
     "control.num_samples": 8,
 }

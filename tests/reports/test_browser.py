@@ -234,7 +234,7 @@ def test_the_values_of_a_scan_can_be_read(page: Page) -> None:
 
 
 def test_bearings_ranges_and_positions_are_drawn(browser: Browser, tmp_path: Path) -> None:
-    campaign = campaign_of(planners=["still"], set=MIXED_SENSORS, runs=1)
+    campaign = campaign_of(planners=["stationary"], set=MIXED_SENSORS, runs=1)
     write_report(results_of(tmp_path / "results", campaign), tmp_path / "report.html")
     page = browser.open(tmp_path / "report.html")
     choose(page, "scrubber", "5")

@@ -22,8 +22,8 @@ TIMES = 25.0  # how much longer an error becomes
 
 @pytest.fixture(scope="module")
 def group(tmp_path_factory: pytest.TempPathFactory) -> Group:
-    settings = {"time.num_steps": 30, "ospa.from_step": 12, "ospa.to_step": 30}
-    campaign = campaign_of(planners=["still", "random"], seed=4, set=settings)
+    settings = {"time.num_steps": 30, "ospa.first_scan": 12, "ospa.last_scan": 30}
+    campaign = campaign_of(planners=["stationary", "random"], seed=4, set=settings)
     (found,) = comparison_groups(results_of(tmp_path_factory.mktemp("consistency") / "results", campaign))
     return found
 

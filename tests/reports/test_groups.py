@@ -24,24 +24,26 @@ from vedette.reports.tables import error_table
     ],
 )
 def test_axes_have_words_and_units(axis: str, label: str, unit: str) -> None:
-    (cell,) = campaign_of(planners=["still"]).cells
+    (cell,) = campaign_of(planners=["stationary"]).cells
     assert (axis_label(axis), axis_unit(cell, axis)) == (label, unit)
 
 
 def test_runs_that_not_every_strategy_has_are_left_out_of_a_comparison(tmp_path: Path) -> None:
-    campaign = campaign_of(planners=["fixed", "still"], runs=3)
-    (group,) = comparison_groups(results_of(tmp_path / "results", campaign, skipped={("still", 1)}))
+    campaign = campaign_of(planners=["constant", "stationary"], runs=3)
+    (group,) = comparison_groups(results_of(tmp_path / "results", campaign, skipped={("stationary", 1)}))
     assert group.comparison is not None
-    assert (group.comparison.strategies, group.comparison.num_runs) == (("fixed", "still"), 2)
+    assert (group.comparison.strategies, group.comparison.num_runs) == (("constant", "stationary"), 2)
     assert [each.ensemble.runs.tolist() for each in group.strategies] == [[0, 2], [0, 2]]
     assert [each.num_finished for each in group.strategies] == [3, 2]
     assert [len(each.counted) for each in group.strategies] == [40, 40]
     assert group.strategies[1].record(2).run == 2
-    assert {name: len(errors) for name, errors in run_errors(group).items()} == {"fixed": 2, "still": 2}
+    assert {name: len(errors) for name, errors in run_errors(group).items()} == {"constant": 2, "stationary": 2}
 
 
 def test_errors_have_their_tails_next_to_them(tmp_path: Path) -> None:
-    (group,) = comparison_groups(results_of(tmp_path / "results", campaign_of(planners=["still", "random"], runs=3)))
+    (group,) = comparison_groups(
+        results_of(tmp_path / "results", campaign_of(planners=["stationary", "random"], runs=3))
+    )
     table = error_table(group)
     assert table is not None
     assert group.comparison is not None
@@ -54,7 +56,7 @@ def test_errors_have_their_tails_next_to_them(tmp_path: Path) -> None:
 
 def test_groups_are_named_by_differing_settings(tmp_path: Path) -> None:
     grid = {"sensors.*.clutter.rate": [5.0, 40.0], "sensors.*.noise.sigma_range": [10.0, 20.0]}
-    campaign = campaign_of(planners=["still"], grid=grid, runs=1)
+    campaign = campaign_of(planners=["stationary"], grid=grid, runs=1)
     groups = list(comparison_groups(results_of(tmp_path / "results", campaign)))
     titles = ["paper-a, noise sigma range 10", "paper-a, noise sigma range 20"]
     assert [group.title for group in groups] == titles
@@ -77,9 +79,9 @@ def test_groups_are_named_by_differing_settings(tmp_path: Path) -> None:
 def test_strategies_with_other_scan_times_are_not_compared_and_drawn_each_over_its_own(
     axis: str, values: list[float], names: list[str], tmp_path: Path
 ) -> None:
-    few = {"time.num_steps": 4, "control.decision_steps": [2], "ospa.from_step": 3, "ospa.to_step": 4}
+    few = {"time.num_steps": 4, "control.decision_steps": [2], "ospa.first_scan": 3, "ospa.last_scan": 4}
     few.pop(axis, None)
-    spec = {"planners": ["still"], "compare": axis, "grid": {axis: values}, "set": few, "runs": 1}
+    spec = {"planners": ["stationary"], "compare": axis, "grid": {axis: values}, "set": few, "runs": 1}
     (group,) = comparison_groups(results_of(tmp_path / "results", campaign_of(**spec)))
     assert group.comparison is None
     assert "its runs have others" in group.reason

@@ -94,7 +94,7 @@ def test_names_are_text_and_never_part_of_the_page(tmp_path: Path) -> None:
     (tmp_path / "hostile.yaml").write_text(text.replace("name: sensor 1", f"name: '{HOSTILE}'", 1), "utf-8")
     variants = [{"name": HOSTILE}, {"name": "</script><b>"}]
     scenarios = [str(tmp_path / "hostile.yaml")]
-    campaign = campaign_of(name=HOSTILE, scenarios=scenarios, planners=["still"], variants=variants)
+    campaign = campaign_of(name=HOSTILE, scenarios=scenarios, planners=["stationary"], variants=variants)
     page = page_of(results_of(tmp_path / "results", campaign), tmp_path)
     parsed = Words(page)
     assert parsed.elements.count("script") == 2
@@ -104,8 +104,8 @@ def test_names_are_text_and_never_part_of_the_page(tmp_path: Path) -> None:
 
 
 def test_strategies_without_a_run_in_common_are_shown_but_not_compared(tmp_path: Path) -> None:
-    campaign = campaign_of(planners=["random", "fixed", "still"])
-    skipped = {("fixed", 0), ("random", 1), ("still", 0), ("still", 1)}
+    campaign = campaign_of(planners=["random", "constant", "stationary"])
+    skipped = {("constant", 0), ("random", 1), ("stationary", 0), ("stationary", 1)}
     words = Words(page_of(results_of(tmp_path / "results", campaign, skipped=skipped), tmp_path)).words
     assert "Unfinished: 2 of 6 runs are in." in words
     assert "There is nothing to compare yet" in words
@@ -115,8 +115,8 @@ def test_strategies_without_a_run_in_common_are_shown_but_not_compared(tmp_path:
 
 
 def test_a_campaign_without_any_run_has_a_report(tmp_path: Path) -> None:
-    campaign = campaign_of(planners=["random", "fixed"], runs=1)
-    skipped = {("random", 0), ("fixed", 0)}
+    campaign = campaign_of(planners=["random", "constant"], runs=1)
+    skipped = {("random", 0), ("constant", 0)}
     words = Words(page_of(results_of(tmp_path / "results", campaign, skipped=skipped), tmp_path)).words
     assert "Unfinished: 0 of 2 runs are in." in words
     assert "There is no finished run to replay." in words
@@ -124,7 +124,7 @@ def test_a_campaign_without_any_run_has_a_report(tmp_path: Path) -> None:
 
 def test_a_number_that_is_compared_is_named_and_swept(tmp_path: Path) -> None:
     axis = "sensors.*.clutter.rate"
-    campaign = campaign_of(planners=["fixed"], grid={axis: [5.0, 40.0]}, compare=axis)
+    campaign = campaign_of(planners=["constant"], grid={axis: [5.0, 40.0]}, compare=axis)
     results = results_of(tmp_path / "results", campaign)
     words = Words(page_of(results, tmp_path, replays=[(campaign.cells[1].name, 0)])).words
     assert "Which clutter rate is best on paper-a?" in words
@@ -134,7 +134,7 @@ def test_a_number_that_is_compared_is_named_and_swept(tmp_path: Path) -> None:
 
 
 def test_scenarios_are_groups_and_not_compared_with_one_another(tmp_path: Path) -> None:
-    campaign = campaign_of(planners=["still"], scenarios=["paper-a", "paper-e"], runs=1)
+    campaign = campaign_of(planners=["stationary"], scenarios=["paper-a", "paper-e"], runs=1)
     words = Words(page_of(results_of(tmp_path / "results", campaign), tmp_path)).words
     assert words.count("OSPA against time") == 2
     assert "There is nothing to compare: one strategy each." in words
@@ -142,7 +142,7 @@ def test_scenarios_are_groups_and_not_compared_with_one_another(tmp_path: Path) 
 
 def test_measures_of_labels_are_left_out_for_filters_that_have_none(tmp_path: Path) -> None:
     filters = ["delta_glmb", "phd"]
-    campaign = campaign_of(planners=["still"], scenarios=["linear-10"], filters=filters, runs=1)
+    campaign = campaign_of(planners=["stationary"], scenarios=["linear-10"], filters=filters, runs=1)
     page = page_of(results_of(tmp_path / "results", campaign), tmp_path)
     rows = re.findall(r'<th scope="row">([^<]+)</th><td>([^<]+)</td><td>([^<]+)</td></tr>', page)
     missing = {name for name, glmb, phd in rows if phd == "\N{EN DASH}" != glmb}
@@ -152,7 +152,7 @@ def test_measures_of_labels_are_left_out_for_filters_that_have_none(tmp_path: Pa
 def test_a_large_page_omits_figures_and_runs_with_a_note(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(html, "MAX_FIGURE_BYTES", 1000)
     monkeypatch.setattr(html, "MAX_REPLAY_BYTES", 100_000)
-    campaign = campaign_of(planners=["fixed"], variants=[{"name": "one"}, {"name": "two"}], compare="planner")
+    campaign = campaign_of(planners=["constant"], variants=[{"name": "one"}, {"name": "two"}], compare="planner")
     words = Words(page_of(results_of(tmp_path / "results", campaign), tmp_path)).words
     assert words.count("not drawn for this group") == 1
     assert words.count("Run by run") == 2
@@ -202,8 +202,8 @@ def test_runs_that_are_not_there_are_refused(
 
 def test_a_page_that_cannot_be_written_is_an_error(tmp_path: Path) -> None:
     (tmp_path / "file").write_text("")
-    campaign = campaign_of(planners=["still"], runs=1)
-    results = results_of(tmp_path / "results", campaign, skipped={("still", 0)})
+    campaign = campaign_of(planners=["stationary"], runs=1)
+    results = results_of(tmp_path / "results", campaign, skipped={("stationary", 0)})
     with pytest.raises(InputError, match="expected a place to write a report"):
         write_report(results, tmp_path / "file" / "report.html")
 
@@ -220,7 +220,7 @@ def test_the_specification_reads_back() -> None:
 
 def test_long_names_stay_whole_in_the_table_of_errors_and_short_elsewhere(tmp_path: Path) -> None:
     long = "x" * 60
-    campaign = campaign_of(planners=["fixed"], variants=[{"name": long}, {"name": "y"}])
+    campaign = campaign_of(planners=["constant"], variants=[{"name": long}, {"name": "y"}])
     results = results_of(tmp_path / "results", campaign)
     page = page_of(results, tmp_path)
     short = f"{'x' * 16}\N{HORIZONTAL ELLIPSIS}{'x' * 15}"
@@ -242,7 +242,7 @@ def test_sessions_that_are_alike_share_a_column() -> None:
 
 
 def test_one_run_claims_no_interval_and_no_win(tmp_path: Path) -> None:
-    campaign = campaign_of(planners=["random", "fixed", "still"], runs=1)
+    campaign = campaign_of(planners=["random", "constant", "stationary"], runs=1)
     words = Words(page_of(results_of(tmp_path / "results", campaign), tmp_path)).words
     assert "1 paired run, mean over t = " in words
     assert "one run" in words

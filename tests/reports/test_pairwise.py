@@ -15,7 +15,7 @@ from vedette.reports.pairwise import all_pairs, compare_pair, compare_with_first
 def comparison_of(*errors: list[float]) -> Comparison:
     """Strategies a, b, ... on one scan, with the given OSPA in each run."""
     names = tuple("abcde"[: len(errors)])
-    scan = make_record("fixed", num_scans=1).summary()
+    scan = make_record("constant", num_scans=1).summary()
     ensembles = [
         build_ensemble(
             (replace(scan, run=run, ospa=np.array([[total, total, 0.0]])), None) for run, total in enumerate(of)

@@ -31,7 +31,7 @@ def strategies_of(folder: Path, **fields: Any) -> dict[str, Strategy]:
 
 @pytest.fixture(scope="module")
 def strategies(tmp_path_factory: pytest.TempPathFactory) -> Mapping[str, Strategy]:
-    return strategies_of(tmp_path_factory.mktemp("replay") / "results", planners=["jdm", "idm", "fixed"])
+    return strategies_of(tmp_path_factory.mktemp("replay") / "results", planners=["jdm", "idm", "constant"])
 
 
 def test_it_holds_the_truth_the_poses_and_the_errors(strategies: Mapping[str, Strategy]) -> None:
@@ -64,7 +64,7 @@ def test_estimates_have_their_two_sigma_ellipse_and_their_error(strategies: Mapp
 
 
 def test_bearing_and_range_become_a_point(strategies: Mapping[str, Strategy]) -> None:
-    strategy = strategies["fixed"]
+    strategy = strategies["constant"]
     record = strategy.record(0)
     data = replay_data(strategy, record, "", trust=True)
     scans: Any = scans_of(record, build_experiment(strategy.cell.scenario))
@@ -78,7 +78,7 @@ def test_bearing_and_range_become_a_point(strategies: Mapping[str, Strategy]) ->
 
 
 def test_bearings_and_ranges_alone_stay_what_they_are(tmp_path: Path) -> None:
-    strategy = strategies_of(tmp_path / "results", planners=["still"], set=MIXED_SENSORS)["still"]
+    strategy = strategies_of(tmp_path / "results", planners=["stationary"], set=MIXED_SENSORS)["stationary"]
     data = replay_data(strategy, strategy.record(0), "", trust=True)
     assert [sensor["kind"] for sensor in data["sensors"]] == ["ray", "circle"]
     assert data["sensors"][0]["half_width"] == pytest.approx(math.pi / 3.0, abs=1e-4)
@@ -120,7 +120,7 @@ def test_independent_decisions_are_curves_and_fixed_ones_nothing(strategies: Map
     decision = replay_data(strategies["idm"], strategies["idm"].record(0), "", trust=True)["decisions"][0]
     assert decision["map"] is None
     assert [curve["sensor"] for curve in decision["curves"]] == [0, 1]
-    decision = replay_data(strategies["fixed"], strategies["fixed"].record(0), "", trust=True)["decisions"][0]
+    decision = replay_data(strategies["constant"], strategies["constant"].record(0), "", trust=True)["decisions"][0]
     assert (decision["map"], decision["curves"]) == (None, [])
 
 
@@ -173,7 +173,7 @@ def test_decisions_that_tell_less_say_why(strategies: Mapping[str, Strategy]) ->
         assert "case by case" in facts["Not known"]
         assert "Second best" in facts
         assert told[name]["why"]["targets"] == told[name]["why"]["sensors"] == []
-    assert told["fixed"]["why"] is None
+    assert told["constant"]["why"] is None
 
 
 def test_without_the_models_there_are_no_measurements(
@@ -183,4 +183,4 @@ def test_without_the_models_there_are_no_measurements(
         raise InputError("function: expected a file; got none")
 
     monkeypatch.setattr(Sensor, "build", missing)
-    assert replay_data(strategies["fixed"], strategies["fixed"].record(0), "", trust=True)["scans"] == []
+    assert replay_data(strategies["constant"], strategies["constant"].record(0), "", trust=True)["scans"] == []

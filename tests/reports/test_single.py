@@ -29,7 +29,7 @@ def tracked(folder: Path, truth: bool) -> tuple[RecordingScenario, RunRecord]:
     found = scenario_from_recording(
         folder / "radars.yaml", folder / "scans.csv", folder / "truth.csv" if truth else None
     )
-    return found, run_scenario(found.scenario, "still", seed=0)
+    return found, run_scenario(found.scenario, "stationary", seed=0)
 
 
 def data_of(record: RunRecord, scenario: Scenario) -> dict[str, Any]:

@@ -33,7 +33,7 @@ filter: {kind: m_delta_glmb}
 fusion: {kind: cm_delta_glmb, weights: [0.5, 0.5]}
 estimator: {kind: marginal, threshold: 0.6}
 control: {decision_steps: [4, 8]}
-ospa: {cutoff: 50.0, from_step: 5, to_step: 20}
+ospa: {cutoff: 50.0, first_scan: 5, last_scan: 20}
 """
 
 

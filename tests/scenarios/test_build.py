@@ -226,7 +226,7 @@ def test_a_filter_without_labels_runs_alone_and_names_its_estimates_by_the_scan(
     estimate = experiment.estimate(state.fused, 8)
     estimate.validate()
     assert estimate.labels.tolist() == [[8, i] for i in range(estimate.num_targets)]
-    for planner in ("random", "fixed"):
+    for planner in ("random", "constant"):
         made: Any = build.build_planner(loaded, planner)
         made.plan(state, experiment.poses, rng=np.random.default_rng(0))
     for planner in ("jdm", "idm"):
@@ -266,8 +266,18 @@ def of_decisions(loaded: Scenario) -> Any:
 @pytest.mark.parametrize(
     ("kind", "filters", "rule", "of_decision"),
     [
-        ("clmb, by_views: true", "lmb", Clmb((0.5, 0.5), by_views=True), ParallelUpdate()),
-        ("arithmetic_average, by_views: true", "lmb", ArithmeticAverage((0.5, 0.5), True), ParallelUpdate()),
+        (
+            "clmb, field_of_view_weighting: true",
+            "lmb",
+            Clmb((0.5, 0.5), field_of_view_weighting=True),
+            ParallelUpdate(),
+        ),
+        (
+            "arithmetic_average, field_of_view_weighting: true",
+            "lmb",
+            ArithmeticAverage((0.5, 0.5), True),
+            ParallelUpdate(),
+        ),
         ("arithmetic_average", "m_delta_glmb", ArithmeticAverage((0.5, 0.5)), ParallelUpdate()),
         ("clmb, matching: assignment", "lmb", LabelMatchedFusion(Clmb((0.5, 0.5))), Clmb((0.5, 0.5))),
         (
@@ -294,11 +304,11 @@ def test_decisions_take_scans_in_full_or_go_by_plain_covariance_intersection(
         if not isinstance(expected, ParallelUpdate):
             assert made.weights == expected.weights
             assert made.limits.merge_distance == 1.0
-        assert getattr(made, "by_views", False) == getattr(expected, "by_views", False)
+        assert getattr(made, "field_of_view_weighting", False) == getattr(expected, "field_of_view_weighting", False)
     assert tracker.feedback == (kind == "parallel")
     assert isinstance(tracker.fusion, LabelMatchedFusion) == ("matching" in kind)
     assert kind.split(",")[0] in dict(summary_rows(loaded.model))["fusion"]
-    assert ("by views" in dict(summary_rows(loaded.model))["fusion"]) == ("by_views" in kind)
+    assert ("by views" in dict(summary_rows(loaded.model))["fusion"]) == ("field_of_view_weighting" in kind)
 
 
 CENTRAL = [
@@ -334,8 +344,8 @@ def test_the_marginal_estimator_has_its_threshold() -> None:
 
 
 def test_actions_of_one_sensor_and_of_all() -> None:
-    text = "platform: {kind: courses, speed: 5.0, headings_deg: [-10, 10], relative: true}"
-    shared = "sensor_defaults:\n  platform: {kind: courses, speed: 5.0}"
+    text = "platform: {kind: heading, speed: 5.0, headings_deg: [-10, 10], relative: true}"
+    shared = "sensor_defaults:\n  platform: {kind: heading, speed: 5.0}"
     loaded = scenario(("heading_deg: 4.0", text), ("sensor_defaults:", shared))
     own, common = (sensor.platform for sensor in build.build_sensors(loaded))
     pose = np.array([0.0, 0.0, math.pi / 2])
@@ -435,7 +445,9 @@ def test_default_reward_is_the_scored_error(score: str, reward: ExpectedLossRewa
 
 def test_an_unknown_planner() -> None:
     loaded = scenario()
-    known = "jdm, idm, lookahead, nearest, assigned, centroid, oracle, told, random, fixed, still"
+    known = (
+        "jdm, idm, lookahead, nearest, assigned_target, centroid, oracle, true_targets, random, constant, stationary"
+    )
     with pytest.raises(InputError, match=f"planner: expected one of {known}; got 'greedy'"):
         build.build_planner(loaded, "greedy")
 
@@ -456,7 +468,7 @@ def test_built_in_scenarios_run(name: str) -> None:
     loaded, rng = load_scenario(name), np.random.default_rng(1)
     experiment, state, truth = tracked(loaded, 12, rng)
     assert abs(len(experiment.estimate(state.fused, 12).labels) - len(truth.at(11)[0])) <= 1
-    for planner in ("random", "fixed"):
+    for planner in ("random", "constant"):
         decides: Any = build.build_planner(loaded, planner)
         plan = decides.plan(state, experiment.poses, rng=rng)
         assert plan.num_sensors == experiment.num_sensors

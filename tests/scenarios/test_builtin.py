@@ -88,7 +88,7 @@ def test_the_papers_scenario_has_the_numbers_of_the_notes(name: str) -> None:
     assert not any(track.process_noise for track in model.targets.tracks)
     assert [sensor.position for sensor in model.sensors] == layout["sensors"]
     assert {sensor.platform for sensor in model.sensors} == {Heading(speed=layout["speed"])}
-    assert {sensor.moves_from for sensor in model.sensors} == {"first_decision"}
+    assert {sensor.stationary_until_first_decision for sensor in model.sensors} == {True}
     assert [site.mean for site in model.birth.sites] == [(x, y, 0.0, 0.0) for x, y, *_ in layout["targets"]]
     assert {(site.existence, site.std) for site in model.birth.sites} == {(0.02, (50.0, 50.0, 25.0, 25.0))}
     assert model.birth.steps == (1,)
@@ -119,7 +119,7 @@ def test_the_papers_scenario_has_the_papers_numbers(name: str) -> None:
         "position",
         10,
     )
-    assert (model.ospa.from_step, model.ospa.to_step) == (11, 40)
+    assert (model.ospa.first_scan, model.ospa.last_scan) == (11, 40)
 
 
 def field_at(model: Any, path: str) -> Any:
@@ -137,7 +137,7 @@ def test_every_choice_that_the_paper_leaves_open_is_a_field_with_its_default(row
         "region": {"x_min": 0.0, "x_max": 1.0, "y_min": 0.0, "y_max": 1.0},
         "birth": {"sites": [{"existence": 0.1, "mean": [0.0] * 4, "std": [1.0] * 4}]},
         "targets": {"kind": "scripted", "tracks": []},
-        "sensors": [{"position": [0.0, 0.0], "platform": {"kind": "courses", "speed": 1.0}}],
+        "sensors": [{"position": [0.0, 0.0], "platform": {"kind": "heading", "speed": 1.0}}],
         "control": {"reward": {"kind": "cauchy_schwarz"}},
     }
     assert field_at(ScenarioModel.model_validate(least), path) == default
@@ -152,7 +152,7 @@ def test_ten_targets_inside_the_region_and_as_many_at_once(name: str, measures: 
     assert (truth.states[:, :2] > [region.x_min, region.y_min]).all()
     assert (truth.states[:, :2] < [region.x_max, region.y_max]).all()
     sensor = scenario.model.sensors[0]
-    assert (sensor.measurement.kind, sensor.platform.kind) == (measures, "still")
+    assert (sensor.measurement.kind, sensor.platform.kind) == (measures, "stationary")
     assert len(scenario.model.birth.sites) == 4
 
 

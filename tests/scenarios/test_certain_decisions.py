@@ -15,7 +15,7 @@ from vedette.scenarios.dumping import dump_scenario
 from vedette.scenarios.summary import summary_rows
 
 SAMPLED = "reward: {kind: cauchy_schwarz}"
-SHORT = (("num_steps: 20", "num_steps: 6"), ("to_step: 20", "to_step: 6"), ("end_step: 18", "end_step: 6"))
+SHORT = (("num_steps: 20", "num_steps: 6"), ("last_scan: 20", "last_scan: 6"), ("end_step: 18", "end_step: 6"))
 
 
 def scenario(control: str) -> Scenario:

@@ -181,7 +181,7 @@ birth: {sites: [{existence: 0.05, mean: [0.0, 0.0, 0.0, 0.0], std: [30.0, 30.0, 
 targets: {kind: scripted, tracks: [{state: [10.0, 10.0, 1.0, 0.0]}]}
 sensors:
   - position: [0.0, 0.0]
-    platform: {kind: courses, speed: 5.0, headings_deg: [0.0, 90.0]}
+    platform: {kind: heading, speed: 5.0, headings_deg: [0.0, 90.0]}
     measurement: {kind: position}
     noise: {kind: constant, std: [5.0, 5.0]}
     detection: {kind: constant, probability: 0.9}
@@ -202,7 +202,10 @@ def one_sensor(*changes: tuple[str, str]) -> str:
 
 @pytest.mark.parametrize("kind", ["phd", "cphd", "cb_member"])
 def test_late_scans_and_planners_of_labels_do_not_go_with_filters_without(kind: str) -> None:
-    late = ("clutter: {kind: region, rate: 1.0}", "clutter: {kind: region, rate: 1.0}\n    scans: {late: {up_to: 1.0}}")
+    late = (
+        "clutter: {kind: region, rate: 1.0}",
+        "clutter: {kind: region, rate: 1.0}\n    scans: {late: {max_delay: 1.0}}",
+    )
     planners = "planners: {a: {kind: joint}, b: {kind: independent}, c: {kind: lookahead}, d: {kind: nearest}}"
     text = one_sensor(("kind: lmb", f"kind: {kind}"), late, ("control:", f"{planners}\ncontrol:"))
     with pytest.raises(ScenarioError) as error:
@@ -219,7 +222,8 @@ def test_late_scans_and_planners_of_labels_do_not_go_with_filters_without(kind: 
 
 
 UNLABELLED = (
-    "jdm, idm, lookahead or told is refused: expected nearest, assigned, centroid, oracle or custom, as {} filters have"
+    "jdm, idm, lookahead or true_targets is refused: expected nearest, assigned_target, centroid, oracle or custom, "
+    "as {} filters have"
 )
 
 
@@ -271,7 +275,7 @@ def test_one_sensor_has_nothing_to_match_its_labels_with(kind: str) -> None:
     old = "{sites: [{existence: 0.05, mean: [0.0, 0.0, 0.0, 0.0], std: [30.0, 30.0, 5.0, 5.0]}]}"
     filters = "delta_glmb" if kind == "cm_delta_glmb" else "lmb"
     changes = ((old, births), ("fusion: {kind: none}", f"fusion: {{kind: {kind}}}"), ("kind: lmb", f"kind: {filters}"))
-    record = run_scenario(Scenario(parse_scenario(one_sensor(*changes))), "still", seed=0)
+    record = run_scenario(Scenario(parse_scenario(one_sensor(*changes))), "stationary", seed=0)
     assert len(record.estimates) == 4
 
 

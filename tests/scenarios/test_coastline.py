@@ -152,8 +152,8 @@ def test_pictures_and_replays_have_it_and_limits_are_as_without(tmp_path: Path) 
     np.testing.assert_allclose(drawn(figure)[0], EDGE, atol=1e-6)
     assert figure.axes[0].get_xlim() == without.axes[0].get_xlim()
     assert "coastline" in [text.get_text() for legend in figure.legends for text in legend.get_texts()]
-    record = run_scenario(scenario, "still", seed=0)
-    figure = tracks_figure(record, scene=build_scene(scenario, "still"))
+    record = run_scenario(scenario, "stationary", seed=0)
+    figure = tracks_figure(record, scene=build_scene(scenario, "stationary"))
     np.testing.assert_allclose(drawn(figure)[0], EDGE, atol=1e-6)
     (line,) = [corners for kind, corners in data_of(record, scenario)["zones"] if kind == COAST]
     np.testing.assert_allclose(line, EDGE, atol=0.5)

@@ -47,7 +47,7 @@ def written(folder: Path, control: str) -> Scenario:
             "search: {kind: sequential_greedy, order: best_first}, limits: {max_glmb_targets: 0}",
             SequentialGreedy("best_first"),
         ),
-        ("search: {kind: cross_entropy, num_samples: 50, elite_share: 0.2}", CrossEntropy(50, 0.2)),
+        ("search: {kind: cross_entropy, num_samples: 50, elite_fraction: 0.2}", CrossEntropy(50, 0.2)),
     ],
 )
 def test_searches(tmp_path: Path, text: str, made: Any) -> None:
@@ -118,7 +118,7 @@ def test_a_run_with_a_search(tmp_path: Path, kind: str) -> None:
     ],
 )
 def test_default_horizon_reaches_the_next_decision(fields: dict[str, Any], horizon: tuple[int, float]) -> None:
-    given = {"time.num_steps": 27, "time.step_period": 0.5, "control.decision_steps": [10, 20], "ospa.to_step": None}
+    given = {"time.num_steps": 27, "time.step_period": 0.5, "control.decision_steps": [10, 20], "ospa.last_scan": None}
     scenario = replace_fields(Scenario(parse_scenario(MINIMAL)), given | fields)
     assert scenario.model.horizon == horizon
     planner: Any = build_planner(scenario, "jdm")

@@ -59,7 +59,7 @@ sensor_defaults:
   noise: {kind: constant, std: [0.01, 10.0]}
   detection: {kind: constant, probability: 0.9}
   clutter: {kind: region, rate: 1.0}
-  platform: {kind: courses, speed: 5.0, courses_deg: [0, 60, 135, 270]}
+  platform: {kind: heading, speed: 5.0, courses_deg: [0, 60, 135, 270]}
 sensors:
   - {name: one, position: {lon: 0.35, lat: 50.7}, course_deg: 60}
   - {name: two, position: {lon: 0.36, lat: 50.7}, course_deg: 0}
@@ -232,7 +232,7 @@ def test_live_tracks_have_courses_and_speeds(tmp_path: Path) -> None:
 
 def on_earth(**changes: Any) -> Scenario:
     fields = {"origin": {"lon": -1.05, "lat": 50.7}, "time.num_steps": 12, "control.decision_steps": [2, 7]}
-    return replace_fields(load_scenario("paper-a"), {**fields, "ospa.from_step": 1, "ospa.to_step": None, **changes})
+    return replace_fields(load_scenario("paper-a"), {**fields, "ospa.first_scan": 1, "ospa.last_scan": None, **changes})
 
 
 def test_tables_and_texts_of_a_run_have_courses() -> None:
@@ -279,7 +279,7 @@ def test_a_scenario_may_give_courses(tmp_path: Path) -> None:
     )
     assert boats(tmp_path, turns).scenario.model.sensors[0].platform.headings_deg == (-30.0, 0.0)
     camera = "{kind: camera, half_width_deg: 20.0, azimuth_deg: 0, azimuths_deg: [0, 90]}"
-    text = BOATS.replace("{kind: courses, speed: 5.0, courses_deg: [0, 60, 135, 270]}", camera)
+    text = BOATS.replace("{kind: heading, speed: 5.0, courses_deg: [0, 60, 135, 270]}", camera)
     platform = boats(tmp_path, text).scenario.model.sensors[0].platform
     assert platform.pointings_deg == (90.0, 0.0)
     assert platform.pointing_deg == pytest.approx(90.0 + 1.40 * math.sin(math.radians(50.7)), abs=0.005)
@@ -316,7 +316,7 @@ def test_a_program_gets_the_scene_by_compass(tmp_path: Path) -> None:
     assert [sensor["course_deg"] for sensor in told] == [60.0, 0.0]
     assert told[0]["platform"]["courses_deg"] == (0.0, 60.0, 135.0, 270.0)
     assert "heading" not in json.dumps(told)
-    assert build_planner(known, "fixed") is not None
+    assert build_planner(known, "constant") is not None
 
 
 def test_figures_draw_courses_from_north() -> None:

@@ -42,7 +42,10 @@ ALL = (
         "{decision_steps: [4, 8]}",
         f"\n  decision_steps: [2, 4]\n  horizon_steps: 1\n  num_samples: 2\n  reward: {own('reward', '{scale: 2.0}')}\n  search: {own('FirstOfAll')}\n  constraints: [{own('OddOnes', '{spared: 2}')}]\nplanners:\n  last: {own('Last')}\n  third: {own('Last', '{skip: 1}')}\n  breaks: {own('Breaks')}",
     ),
-    ("from_step: 5, to_step: 20}", f"from_step: 1, to_step: 6}}\nmetrics:\n  found: {own('count', '{factor: 2.0}')}"),
+    (
+        "first_scan: 5, last_scan: 20}",
+        f"first_scan: 1, last_scan: 6}}\nmetrics:\n  found: {own('count', '{factor: 2.0}')}",
+    ),
 )
 
 
@@ -107,7 +110,7 @@ def test_custom_code_that_fails_during_a_run_is_named(scenario: Scenario) -> Non
 def test_an_unknown_custom_planner(scenario: Scenario) -> None:
     with pytest.raises(
         InputError,
-        match="planner: expected one of jdm, idm, lookahead, nearest, assigned, centroid, oracle, told, random, fixed, still, last, third, breaks; got 'x'",
+        match="planner: expected one of jdm, idm, lookahead, nearest, assigned_target, centroid, oracle, true_targets, random, constant, stationary, last, third, breaks; got 'x'",
     ):
         run_scenario(scenario, "x", seed=1)
 
@@ -171,7 +174,7 @@ def test_a_measure_that_is_no_number_a_scan(folder: Path) -> None:
     file = folder / "scene.yaml"
     file.write_text(file.read_text().replace("count', arguments: {factor: 2.0}", "short_count', arguments: {}"))
     loaded = load_scenario(file)
-    record = run_scenario(loaded, "still", seed=1)
+    record = run_scenario(loaded, "stationary", seed=1)
     with pytest.raises(InputError, match="metric found: expected"):
         measure_run(record, loaded, custom_metrics(loaded))
 

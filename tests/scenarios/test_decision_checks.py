@@ -129,7 +129,7 @@ LABELS = ("{kind: cm_delta_glmb, weights: [0.5, 0.5]}", "{kind: clmb, matching: 
             (
                 (
                     "{kind: cm_delta_glmb, weights: [0.5, 0.5]}",
-                    own("fusion").replace("}", ", feedback: true}\nnetwork: {loss: 0.999}"),
+                    own("fusion").replace("}", ", feedback: true}\nnetwork: {link_loss_probability: 0.999}"),
                 ),
             ),
             "got in the filter at step 2: belief: expected a GLMB; got LMB",

@@ -58,7 +58,7 @@ def planned(filters: str, fusion: str, planner: str, held: Any = None, **fields:
 @pytest.mark.parametrize("fusion", ["sequential", "central", "parallel", "arithmetic_average", "clmb by views"])
 def test_one_belief_is_decided_on_alike_whatever_filter_holds_it(fusion: str, planner: str) -> None:
     kind, _, views = fusion.partition(" by ")
-    fields = {"fusion.by_views": True} if views else {}
+    fields = {"fusion.field_of_view_weighting": True} if views else {}
     _, wanted = planned("lmb", kind, planner, **fields)
     for filters in FILTERS:
         if kind == "parallel" and filters.endswith("delta_glmb"):

@@ -107,7 +107,7 @@ std: [0.02, 3.0] -> std: [0.02, -3.0]
 kind: constant, std: [0.02, 3.0] -> kind: range_dependent, sigma_bearing: 1
     15:34: sensor_defaults.noise.sigma_bearing: expected one of eta_bearing, eta_range, kind, sigma_altitude, sigma_bearing_deg, sigma_elevation_deg, sigma_range, sigma_range_rate, got an unknown key (did you mean sigma_bearing_deg?)
 sensor_defaults:\n  noise: { -> sensor_defaults:\n  nose: {
-    15:3: sensor_defaults.nose: expected one of bias, budget, clutter, compass, detection, heading_deg, height, measurement, moves_from, noise, platform, price, scans, switchable, truth, turn, got an unknown key (did you mean noise?)
+    15:3: sensor_defaults.nose: expected one of bias, budget, clutter, compass, detection, heading_deg, height, measurement, noise, platform, price, scans, stationary_until_first_decision, switchable, true_parameters, turn, got an unknown key (did you mean noise?)
 position: [0.0, 40.0] -> position: [0.0, 40.0, 1.0]
     17:29: sensors[0].position: expected a list of 2, got a list of 3
 heading_deg: 4.0 -> platform: {kind: waypoints, speed: 1.0, points: [[0.0, 1.0], [2.0]]}
@@ -116,21 +116,21 @@ position: [0.0, 40.0], heading_deg -> heading_deg
     17:5: sensors[0].position: required key is missing
 name: south -> name: north
     18:12: sensors[1].name: expected each name once, got "north" again
-heading_deg: 4.0 -> platform: {kind: courses, speed: -4.0}
+heading_deg: 4.0 -> platform: {kind: heading, speed: -4.0}
     17:75: sensors[0].platform.speed: expected a number of at least 0, got -4.0
-heading_deg: 4.0 -> platform: {kind: courses, speed: 4.0, headings_deg: []}
+heading_deg: 4.0 -> platform: {kind: heading, speed: 4.0, headings_deg: []}
     17:94: sensors[0].platform.headings_deg: expected a list of at least 1, got an empty list
-heading_deg: 4.0 -> platform: {kind: courses}
+heading_deg: 4.0 -> platform: {kind: heading}
     17:52: sensors[0].platform: expected either speed or speeds, got neither
-heading_deg: 4.0 -> platform: {kind: curses, speed: 4.0}
-    17:59: sensors[0].platform.kind: expected one of camera, courses, steps, still, waypoints, custom, got "curses" (did you mean courses?)
+heading_deg: 4.0 -> platform: {kind: hedding, speed: 4.0}
+    17:59: sensors[0].platform.kind: expected one of camera, grid_moves, heading, stationary, waypoints, custom, got "hedding" (did you mean heading?)
 heading_deg: 4.0 -> speed: 4.0
-    17:42: sensors[0].speed: expected one of bias, budget, clutter, compass, detection, heading_deg, height, measurement, moves_from, name, noise, platform, position, price, scans, switchable, truth, turn, got an unknown key (the platform of a sensor has it: `platform: {kind: courses, speed: 50.0, headings_deg: [0, 90]}`)
-heading_deg: 4.0 -> platform: {kind: camera, half_width_deg: 200.0, pointings_deg: [0.0], carrier: {kind: camera}}
+    17:42: sensors[0].speed: expected one of bias, budget, clutter, compass, detection, heading_deg, height, measurement, name, noise, platform, position, price, scans, stationary_until_first_decision, switchable, true_parameters, turn, got an unknown key (the platform of a sensor has it: `platform: {kind: heading, speed: 50.0, headings_deg: [0, 90]}`)
+heading_deg: 4.0 -> platform: {kind: camera, half_width_deg: 200.0, pointings_deg: [0.0], platform: {kind: camera}}
     17:83: sensors[0].platform.half_width_deg: expected a number of at most 180, got 200.0
-    17:128: sensors[0].platform.carrier.kind: expected one of still, courses, steps, waypoints, custom, got "camera"
+    17:129: sensors[0].platform.platform.kind: expected one of stationary, heading, grid_moves, waypoints, custom, got "camera"
 heading_deg: 4.0 -> detection: {kind: camera, probability: 0.9, max_range: 50.0}
-    17:5: sensors[0].platform: expected a camera, as its detection is a camera's, got still
+    17:5: sensors[0].platform: expected a camera, as its detection is a camera's, got stationary
 heading_deg: 4.0 -> measurement: {kind: position}, noise: {kind: range_dependent}
     17:80: sensors[0].noise: expected constant, by_axis or custom noise for a position measurement, got range_dependent noise
 heading_deg: 4.0 -> measurement: {kind: range_only}
@@ -144,7 +144,7 @@ heading_deg: 4.0 -> clutter: {kind: measurement_space, rate: 5, low: [-3.0, 0.0]
     17:116: sensors[0].clutter.high[1]: expected a number above low, 0, got -1.0
 heading_deg: 4.0 -> clutter: {kind: region, rate: lots}
     17:72: sensors[0].clutter.rate: expected a number, got "lots"
-heading_deg: 4.0 -> noise: {kind: by_axis, std: [1.0, 1.0], growth: [0.0, 1e-5]}
+heading_deg: 4.0 -> noise: {kind: by_axis, std: [1.0, 1.0], quadratic_growth: [0.0, 1e-5]}
     17:49: sensors[0].noise: expected range_dependent, constant or custom noise for a bearing_range measurement, got by_axis noise
 heading_deg: 4.0
 -> detection: {kind: soft_sector, probability: 0.9, max_range: 50.0, half_width_deg: 200, range_slope: 0}
@@ -155,17 +155,17 @@ heading_deg: 4.0 -> clutter: {kind: around_sensor, radius: 10, half_side: 10}
 heading_deg: 4.0
 -> measurement: {kind: bearing_only}, noise: {kind: constant, std: [0.1]}, clutter: {kind: around_sensor, radius: 10}
     17:123: sensors[0].clutter: expected region, measurement_space or custom clutter for a bearing_only measurement, got around_sensor clutter
-heading_deg: 4.0 -> truth: {measurement: {kind: position}}
-    17:70: sensors[0].truth.measurement.kind: expected bearing_range or custom, as the filter takes it for that, got "position"
+heading_deg: 4.0 -> true_parameters: {measurement: {kind: position}}
+    17:80: sensors[0].true_parameters.measurement.kind: expected bearing_range or custom, as the filter takes it for that, got "position"
 heading_deg: 4.0
--> truth: {noise: {kind: constant, std: [1.0]}, clutter: {kind: measurement_space, low: [0.0, 9.0], high: [1.0, 8.0]}}
-    17:79: sensors[0].truth.noise.std: expected 2 numbers, as a bearing_range measurement has, got a list of 1
-    17:151: sensors[0].truth.clutter.high[1]: expected a number above low, 9, got 8.0
-heading_deg: 4.0 -> truth: {first_detection: {kind: camera, probability: 0.9, max_range: 9.0}}
-    17:5: sensors[0].platform: expected a camera, as its detection is a camera's, got still
+-> true_parameters: {noise: {kind: constant, std: [1.0]}, clutter: {kind: measurement_space, low: [0.0, 9.0], high: [1.0, 8.0]}}
+    17:89: sensors[0].true_parameters.noise.std: expected 2 numbers, as a bearing_range measurement has, got a list of 1
+    17:161: sensors[0].true_parameters.clutter.high[1]: expected a number above low, 9, got 8.0
+heading_deg: 4.0 -> true_parameters: {first_detection: {kind: camera, probability: 0.9, max_range: 9.0}}
+    17:5: sensors[0].platform: expected a camera, as its detection is a camera's, got stationary
 heading_deg: 4.0
--> measurement: {kind: range_only}, noise: {kind: constant, std: [1.0]}, truth: {detection_of: measurement}
-    17:134: sensors[0].truth.detection_of: expected state, as a range_only measurement does not say where the target is, got "measurement"
+-> measurement: {kind: range_only}, noise: {kind: constant, std: [1.0]}, true_parameters: {detection_of: measurement}
+    17:144: sensors[0].true_parameters.detection_of: expected state, as a range_only measurement does not say where the target is, got "measurement"
 heading_deg: 4.0 -> scans: {every: 3, first: 4}
     17:67: sensors[0].scans.first: expected a step up to every, 3, got 4
 heading_deg: 4.0 -> scans: {every: 30, first: 21}
@@ -215,10 +215,10 @@ weights: [0.5, 0.5] -> mixture_power: quadrature, limits: {max_components: 100}
     20:83: fusion.limits.max_components: expected a number whose power by 2 sensors is at most max_combinations, 4096, got 100
 kind: cm_delta_glmb, weights -> kind: clmb, feedback: true, weights
     20:32: fusion.feedback: expected false, as m_delta_glmb filters cannot go on from an LMB, got true
-kind: cm_delta_glmb, weights: [0.5, 0.5] -> kind: parallel, by_views: true, matching: assignment
+kind: cm_delta_glmb, weights: [0.5, 0.5] -> kind: parallel, field_of_view_weighting: true, matching: assignment
     20:16: fusion.kind: expected sequential or another, as parallel is of lmb or factored_glmb filters, and these are m_delta_glmb, got "parallel"
-    20:36: fusion.by_views: expected false, as parallel does not weigh labels (clmb and arithmetic_average do), got true
-    20:52: fusion.matching: expected labels, as under parallel all sensors share them, got "assignment"
+    20:51: fusion.field_of_view_weighting: expected false, as parallel does not weigh labels (clmb and arithmetic_average do), got true
+    20:67: fusion.matching: expected labels, as under parallel all sensors share them, got "assignment"
 kind: cm_delta_glmb, weights: [0.5, 0.5] -> kind: cm_delta_glmb, matching: assignment, feedback: true
     20:41: fusion.matching: expected labels, as with feedback all sensors share them, got "assignment"
 kind: cm_delta_glmb, weights: [0.5, 0.5] -> kind: arithmetic_average, feedback: true
@@ -248,7 +248,7 @@ decision_steps: [4, 8] -> horizon_steps: 0, horizon_period: 0.0
     22:26: control.horizon_steps: expected a number of at least 1, got 0
     22:45: control.horizon_period: expected a number above 0, got 0.0
 decision_steps: [4, 8] -> actions_deg: [0, 90]
-    22:11: control.actions_deg: expected one of association, confidence, constraints, decision_every, decision_steps, decision_times, detection_threshold, explain, horizon_period, horizon_steps, ideal_measurements, indifference, limits, lookahead, max_samples, max_seconds, num_samples, others, reward, search, undetected_worth, got an unknown key (the platform of a sensor has it: `platform: {kind: courses, speed: 50.0, headings_deg: [0, 90]}`)
+    22:11: control.actions_deg: expected one of association, confidence, constraints, decision_every, decision_steps, decision_times, detection_threshold, explain, horizon_period, horizon_steps, ideal_measurements, indifference, limits, lookahead, max_samples, max_seconds, num_samples, others, reward, search, undetected_target_value, got an unknown key (the platform of a sensor has it: `platform: {kind: heading, speed: 50.0, headings_deg: [0, 90]}`)
 decision_steps: [4, 8] -> reward: {kind: cauchy_schwarz, unit_volume: 0}
     22:55: control.reward.unit_volume: expected reference or a number above 0, got 0
 decision_steps: [4, 8] -> reward: {kind: renyi, order: 1}
@@ -258,10 +258,10 @@ decision_steps: [4, 8] -> reward: {kind: entropy}
 decision_steps: [4, 8] -> ideal_measurements: perfect, detection_threshold: 2
     22:31: control.ideal_measurements: expected one of ideal, expected, sampled, got "perfect"
     22:61: control.detection_threshold: expected a number of at most 1, got 2
-to_step: 20 -> to_step: 4
-    23:45: ospa.to_step: expected a step from from_step, 5, on, got 4
-to_step: 20 -> to_step: 30
-    23:45: ospa.to_step: expected a step up to the last, 20, got 30
+last_scan: 20 -> last_scan: 4
+    23:48: ospa.last_scan: expected a scan from first_scan, 5, on, got 4
+last_scan: 20 -> last_scan: 30
+    23:48: ospa.last_scan: expected a step up to the last, 20, got 30
 cutoff: 50.0 -> cutoff: 0, order: 0.5
     23:16: ospa.cutoff: expected a number above 0, got 0
     23:26: ospa.order: expected a number of at least 1, got 0.5
@@ -283,8 +283,8 @@ fusion: {kind: cm_delta_glmb, weights: [0.5, 0.5]} -> fusion: {kind: parallel}\n
     21:39: network.delay: expected none with consensus_rounds, got 2
     21:39: network.delay: expected 0, as parallel divides by the prediction of the same time, got 2
 kind: m_delta_glmb -> kind: lmb
-fusion: {kind: cm_delta_glmb, weights: [0.5, 0.5]} -> fusion: {kind: parallel}\nnetwork: {loss: 1.0}
-    21:17: network.loss: expected a number below 1, got 1.0
+fusion: {kind: cm_delta_glmb, weights: [0.5, 0.5]} -> fusion: {kind: parallel}\nnetwork: {link_loss_probability: 1.0}
+    21:34: network.link_loss_probability: expected a number below 1, got 1.0
 kind: m_delta_glmb -> kind: lmb
 fusion: {kind: cm_delta_glmb, weights: [0.5, 0.5]} -> fusion: {kind: clmb}
 5]\n  sites:\n    - {existence: 0.1, mean: [0.0, 0.0, 0.0, 0.0], std: [5.0, 5.0, 2.0, 2.0]}\ntargets
@@ -310,27 +310,27 @@ noise: {kind: constant, std: [0.02, 3.0]} -> measurement: {kind: bearing_only}\n
 
 # Targets not found yet.
 UNDETECTED = r"""
-to_step: 20} -> to_step: 20}\nundetected: {cell: 0.0, expected: 5.0, speed: 1.0}
-    24:20: undetected.cell: expected a number above 0, got 0.0
-to_step: 20} -> to_step: 20}\nundetected: {expected: 5.0, speed: 1.0}
-    24:1: undetected.cell: required key is missing
-to_step: 20} -> to_step: 20}\nundetected: {cell: 9.0, expected: -1.0, speed: 1.0}
-    24:35: undetected.expected: expected a number of at least 0, got -1.0
-to_step: 20} -> to_step: 20}\nundetected: {cell: 9.0, expected: 1.0, speed: 1.0, enters: sea}
-    24:60: undetected.enters: expected one of anywhere, border, got "sea"
-to_step: 20} -> to_step: 20}\nundetected: {cell: 0.1, expected: 1.0, speed: 1.0}
-    24:20: undetected.cell: expected at least 0.285, as at most 250,000 cells may fill the region, got 0.1
-to_step: 20} -> to_step: 20}\nundetected: {cell: 9.0, expected: 1.0, speed: 1.0, birth_rate: learnt}
-    24:64: undetected.birth_rate: expected a number, as only one belief of all scans by filter.kind factored_glmb with births: poisson learns it, got "learnt"
-to_step: 20} -> to_step: 20}\nundetected: {cell: 9.0, expected: 1.0, speed: 1.0, birth_rate: known}
-    24:64: undetected.birth_rate: expected a number or learnt, got "known"
-to_step: 20} -> to_step: 20}\nundetected: {cell: 9.0, expected: 1.0, speed: 1.0, prior_rate: 0.1}
-    24:64: undetected.prior_rate: expected none, as birth_rate is not learnt, got 0.1
-to_step: 20}
--> to_step: 20}\nundetected: {cell: 9.0, expected: 1.0, speed: 1.0, region: {x_min: 0.0, x_max: 0.0, y_min: 0.0, y_max: 1.0}}
-    24:80: undetected.region.x_max: expected a number above x_min, 0, got 0.0
-control: {decision_steps -> control: {undetected_worth: 3.0, decision_steps
-    22:29: control.undetected_worth: expected 0, or a section `undetected`, which says where such targets may be, got 3.0
+last_scan: 20} -> last_scan: 20}\nundetected: {cell_size: 0.0, expected: 5.0, speed: 1.0}
+    24:25: undetected.cell_size: expected a number above 0, got 0.0
+last_scan: 20} -> last_scan: 20}\nundetected: {expected: 5.0, speed: 1.0}
+    24:1: undetected.cell_size: required key is missing
+last_scan: 20} -> last_scan: 20}\nundetected: {cell_size: 9.0, expected: -1.0, speed: 1.0}
+    24:40: undetected.expected: expected a number of at least 0, got -1.0
+last_scan: 20} -> last_scan: 20}\nundetected: {cell_size: 9.0, expected: 1.0, speed: 1.0, birth_density: sea}
+    24:72: undetected.birth_density: expected one of uniform, boundary, got "sea"
+last_scan: 20} -> last_scan: 20}\nundetected: {cell_size: 0.1, expected: 1.0, speed: 1.0}
+    24:25: undetected.cell_size: expected at least 0.285, as at most 250,000 cells may fill the region, got 0.1
+last_scan: 20} -> last_scan: 20}\nundetected: {cell_size: 9.0, expected: 1.0, speed: 1.0, birth_rate: learnt}
+    24:69: undetected.birth_rate: expected a number, as only one belief of all scans by filter.kind factored_glmb with births: poisson learns it, got "learnt"
+last_scan: 20} -> last_scan: 20}\nundetected: {cell_size: 9.0, expected: 1.0, speed: 1.0, birth_rate: known}
+    24:69: undetected.birth_rate: expected a number or learnt, got "known"
+last_scan: 20} -> last_scan: 20}\nundetected: {cell_size: 9.0, expected: 1.0, speed: 1.0, prior_rate: 0.1}
+    24:69: undetected.prior_rate: expected none, as birth_rate is not learnt, got 0.1
+last_scan: 20}
+-> last_scan: 20}\nundetected: {cell_size: 9.0, expected: 1.0, speed: 1.0, region: {x_min: 0.0, x_max: 0.0, y_min: 0.0, y_max: 1.0}}
+    24:85: undetected.region.x_max: expected a number above x_min, 0, got 0.0
+control: {decision_steps -> control: {undetected_target_value: 3.0, decision_steps
+    22:36: control.undetected_target_value: expected 0, or a section `undetected`, which says where such targets may be, got 3.0
 """
 
 # Searches, constraints and decisions ahead.
@@ -340,9 +340,9 @@ decision_steps: [4, 8] -> search: {kind: annealing}
 decision_steps: [4, 8] -> search: {kind: coordinate_ascent, num_restarts: -1}
     22:59: control.search.num_restarts: expected a number of at least 0, got -1
 decision_steps: [4, 8] -> search: {kind: sequential_greedy, order: last}
-    22:52: control.search.order: expected one of printed, best_first, got "last"
-decision_steps: [4, 8] -> search: {kind: cross_entropy, elite_share: 1.0}
-    22:54: control.search.elite_share: expected a number below 1, got 1.0
+    22:52: control.search.order: expected one of sensor_order, best_first, got "last"
+decision_steps: [4, 8] -> search: {kind: cross_entropy, elite_fraction: 1.0}
+    22:57: control.search.elite_fraction: expected a number below 1, got 1.0
 decision_steps: [4, 8] -> search: {kind: cross_entropy, smoothing: 0.0}
     22:52: control.search.smoothing: expected a number above 0, got 0.0
 decision_steps: [4, 8] -> search: {kind: automatic, num_restarts: 2}
@@ -375,8 +375,8 @@ decision_steps: [4, 8] -> lookahead: {method: forest}
     22:31: control.lookahead.method: expected one of beam, tree, got "forest"
 decision_steps: [4, 8] -> lookahead: {method: tree, beam_width: 4}
     22:49: control.lookahead.beam_width: expected none, as it is of method beam, got 4
-decision_steps: [4, 8] -> lookahead: {rollout: kept}
-    22:32: control.lookahead.rollout: expected none, as it is of method tree, got "kept"
+decision_steps: [4, 8] -> lookahead: {rollout: repeat_last}
+    22:32: control.lookahead.rollout: expected none, as it is of method tree, got "repeat_last"
 decision_steps: [4, 8] -> lookahead: {period: 1.2}
     22:31: control.lookahead.period: expected a whole multiple of control.horizon_period, 0.5, got 1.2
 decision_steps: [4, 8] -> lookahead: {}, association: full, reward: {kind: cauchy_schwarz}
@@ -430,7 +430,7 @@ cutoff: 50.0 -> cutoff: wide
     2:1: name: expected each key once, got it again, after line 1
     24:16: ospa.cutoff: expected a number, got "wide"
 heading_deg: 4.0 -> <<: {heading_deg: 4.0}
-    17:42: sensors[0].<<: expected one of bias, budget, clutter, compass, detection, heading_deg, height, measurement, moves_from, name, noise, platform, position, price, scans, switchable, truth, turn, got an unknown key (YAML 1.2 has no merge keys; sensor_defaults holds what sensors share)
+    17:42: sensors[0].<<: expected one of bias, budget, clutter, compass, detection, heading_deg, height, measurement, name, noise, platform, position, price, scans, stationary_until_first_decision, switchable, true_parameters, turn, got an unknown key (YAML 1.2 has no merge keys; sensor_defaults holds what sensors share)
 kind: constant_velocity, sigma_v: 1.0 -> kind: coordinated_turn
 mean: [0.0, 0.0, 0.0, 0.0], std: [5.0, 5.0, 2.0, 2.0] -> mean: [0.0, 0, 0, 0, 0], std: [5.0, 5, 2, 2, 1]
 targets:\n  kind: scripted\n  tracks:\n    - {state: [1.0, 2.0, 0.5, -0.5], start_step: 2, end_step: 18}

@@ -121,7 +121,7 @@ def test_deep_brackets_of_toml_are_refused(text: str) -> None:
 def test_a_campaign_of_endless_combinations_is_refused() -> None:
     grid = "".join(f'"sensors.{number}.speed" = [1, 2, 3, 4, 5, 6, 7, 8, 9]\n' for number in range(8))
     with pytest.raises(InputError, match=r"expected at most 10000 combinations of settings, got 43046721"):
-        parse_spec(f'name = "a"\nscenarios = ["paper-a"]\nplanners = ["fixed"]\nruns = 1\n[grid]\n{grid}')
+        parse_spec(f'name = "a"\nscenarios = ["paper-a"]\nplanners = ["constant"]\nruns = 1\n[grid]\n{grid}')
 
 
 def test_a_date_is_named_as_one() -> None:

@@ -49,7 +49,7 @@ def test_more_targets_than_a_filter_keeps_by_default_are_all_tracked() -> None:
     """Four targets a sensor: 240, of which a cap of 200 would lose 40."""
     short = {"time.num_steps": 4, "control.decision_steps": []}
     found = replace_fields(scenario(num_sensors=60, num_targets=240), short)
-    record = run_scenario(found, "still", seed=0)
+    record = run_scenario(found, "stationary", seed=0)
     assert len(record.estimates[-1].labels) > 225
 
 

@@ -72,7 +72,7 @@ def test_components_that_do_not_fit_the_motion() -> None:
 @pytest.mark.parametrize("num_targets", [10, 1000])
 def test_crowds_are_tracked_from_a_few_scans_on(num_targets: int, measured: str) -> None:
     short = replace_fields(scenario(num_targets=num_targets, measured=measured), {"time.num_steps": 8})
-    record = run_scenario(short, "still", seed=0, run=0)
+    record = run_scenario(short, "stationary", seed=0, run=0)
     assert record.ospa[-1, 0] < 0.4 * 25.0
     numbers = np.array([estimate.num_targets for estimate in record.estimates])
     assert abs(numbers[-1] - len(record.truth.at(7)[0])) <= 1 + 0.05 * num_targets

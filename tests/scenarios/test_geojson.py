@@ -68,7 +68,7 @@ def test_a_scenario_that_was_read_needs_the_file_no_more(tmp_path: Path) -> None
     (tmp_path / "coast.geojson").unlink()
     (tmp_path / "again.yaml").write_text(dump_scenario(loaded.model), "utf-8")
     assert load_scenario(tmp_path / "again.yaml").model == loaded.model
-    changed = replace_fields(loaded, {"time.num_steps": 12, "ospa.from_step": None, "ospa.to_step": None,
+    changed = replace_fields(loaded, {"time.num_steps": 12, "ospa.first_scan": None, "ospa.last_scan": None,
                                    "control.decision_steps": [4]})  # fmt: skip
     record = run_scenario(changed, "jdm", seed=1, num_threads=1)
     ways = record.poses[:, :, :2]

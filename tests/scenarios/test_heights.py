@@ -70,7 +70,7 @@ sensor_defaults:
   clutter: {kind: region, rate: 2.0, max_height: 12000.0}
   detection: {kind: constant, probability: 0.95}
 sensors:
-  - {name: ship, position: [0, -5000], platform: {kind: courses, speed: 10.0, headings_deg: [0, 90, 180]}}
+  - {name: ship, position: [0, -5000], platform: {kind: heading, speed: 10.0, headings_deg: [0, 90, 180]}}
   - {name: hill, position: [20000, 0]}
 control: {decision_steps: [3]}
 origin: {lon: 10.0, lat: 50.0}
@@ -101,7 +101,7 @@ def test_a_scene_with_heights_is_simulated_decided_and_written(tmp_path: Path) -
 def test_written_scans_are_read_again() -> None:
     text = SIMULATED.replace("altitude}", "elevation}").replace("altitude: 30.0", "elevation_deg: 0.3")
     scenario = Scenario(parse_scenario(text, "air.yaml"))
-    record = run_scenario(scenario, "still", seed=2)
+    record = run_scenario(scenario, "stationary", seed=2)
     table = scan_table(record, scenario)
     assert set(table["own_height_m"]) == {100.0}
     read = parse_scans(
@@ -118,16 +118,16 @@ def test_written_scans_are_read_again() -> None:
 
 
 def test_detection_is_decided_where_was_measured_and_a_search_counts_what_is_unexplained() -> None:
-    text = SIMULATED.replace("  height: 100.0\n", "  height: 100.0\n  truth: {detection_of: measurement}\n")
+    text = SIMULATED.replace("  height: 100.0\n", "  height: 100.0\n  true_parameters: {detection_of: measurement}\n")
     measured = "{sites: [], from_measurements: {expected: 0.5, max_existence: 0.1, std: [500, 500, 200, 200, 3000, 5]}}"
     text = re.sub(
         r"^birth: .*$",
-        f"birth: {measured}\nundetected: {{cell: 5000.0, expected: 1.0, speed: 200.0}}",
+        f"birth: {measured}\nundetected: {{cell_size: 5000.0, expected: 1.0, speed: 200.0}}",
         text,
         flags=re.M,
     )
     text = f"{text}filter: {{kind: lmb}}\n"
-    record = run_scenario(Scenario(parse_scenario(text, "air.yaml")), "still", seed=1)
+    record = run_scenario(Scenario(parse_scenario(text, "air.yaml")), "stationary", seed=1)
     assert abs(record.estimates[-1].means[0, 4] - record.truth.at(5)[1][0, 4]) < 100.0
 
 

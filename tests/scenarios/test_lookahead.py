@@ -48,8 +48,8 @@ def test_the_section_sets_the_planner(plain: Scenario) -> None:
     beam = planner_of(plain, {"depth": 2, "beam_width": 3, "budget": 50, "discount": 0.5, "period": 4.0})
     assert (beam.depth, beam.period, beam.budget, beam.discount) == (2, 4.0, 50, 0.5)
     assert beam.search == BeamSearch(3)
-    tree = planner_of(plain, {"method": "tree", "exploration": 0.1, "rollout": "kept"})
-    assert tree.search == TreeSearch(0.1, "kept")
+    tree = planner_of(plain, {"method": "tree", "exploration": 0.1, "rollout": "repeat_last"})
+    assert tree.search == TreeSearch(0.1, "repeat_last")
 
 
 def test_constraints_are_those_of_all_strategies(gap: Scenario) -> None:

@@ -105,7 +105,7 @@ def test_a_ship_between_two_far_radars_is_one_track(tmp_path: Path) -> None:
     (tmp_path / "scans.csv").write_text("\n".join(lines) + "\n", "utf-8")
     (tmp_path / "radars.yaml").write_text(SENSORS, "utf-8")
     made = scenario_from_recording(tmp_path / "radars.yaml", tmp_path / "scans.csv")
-    record = run_scenario(made.scenario, "still", seed=0)
+    record = run_scenario(made.scenario, "stationary", seed=0)
     last = record.estimates[-1]
     (truth,) = FAR.to_plane([ship[0]], [ship[1]])
     assert len({tuple(label) for estimate in record.estimates for label in estimate.labels.tolist()}) == 1
@@ -138,8 +138,8 @@ def test_scans_are_written_from_true_north_and_read_back() -> None:
         "origin": {"lon": 179.99, "lat": -60.0},
         "time.num_steps": 5,
         "control.decision_steps": [2],
-        "ospa.from_step": 1,
-        "ospa.to_step": 5,
+        "ospa.first_scan": 1,
+        "ospa.last_scan": 5,
         "sensors.0.compass": True,
         "sensors.1.compass": True,
     }

@@ -49,7 +49,7 @@ def seen_by(scenario: Scenario, truth: Truth) -> Floats:
     sensors, columns = experiment.tracker.sensors, []
     for s, sensor in enumerate(sensors):
         poses = np.tile(experiment.poses[s], (truth.num_scans, 1, 1))
-        columns.append(targets_in_view(truth, poses, [sensor], min_detection=0.4))
+        columns.append(targets_in_view(truth, poses, [sensor], min_detection_probability=0.4))
     return np.stack(columns, axis=1)
 
 
@@ -125,8 +125,8 @@ def beginning(name: str) -> Scenario:
 @pytest.mark.parametrize("name", NUMBERS)
 def test_their_beginning_runs_and_what_is_seen_is_tracked(name: str) -> None:
     scenario = beginning(name)
-    record = run_scenario(scenario, "still", seed=1, num_threads=1)
-    share = measure_run(record, scenario, custom_metrics(scenario)).columns()["tracked_share"]
+    record = run_scenario(scenario, "stationary", seed=1, num_threads=1)
+    share = measure_run(record, scenario, custom_metrics(scenario)).columns()["tracked_fraction"]
     assert (record.ospa[:, 0] <= scenario.model.ospa.cutoff).all()
     assert share[-1] >= 0.8
     scans = build_experiment(scenario).scans_at

@@ -45,11 +45,13 @@ def test_scans_go_to_one_filter_or_over_the_radio(kind: str, fusion: str, centra
     alone = tracker_of(kind, f"{{kind: {fusion}}}")
     assert isinstance(alone, Central)
     assert isinstance(alone.filter, central)
-    radio = tracker_of(kind, f"{{kind: {fusion}}}\nnetwork: {{radio_range: 50.0, hops: 2, loss: 0.1, delay: 1}}")
+    radio = tracker_of(
+        kind, f"{{kind: {fusion}}}\nnetwork: {{radio_range: 50.0, max_hops: 2, link_loss_probability: 0.1, delay: 1}}"
+    )
     assert isinstance(radio, ScanNetwork)
     assert isinstance(radio.filter, central)
     network = radio.network
-    assert (network.radio_range, network.hops, network.loss, network.delay) == (50.0, 2, 0.1, 1)
+    assert (network.radio_range, network.max_hops, network.link_loss_probability, network.delay) == (50.0, 2, 0.1, 1)
     assert isinstance(radio.merging, LabelMatchedFusion if kind == "lmb" else CmDeltaGlmb)
 
 
@@ -63,10 +65,10 @@ def test_beliefs_go_to_a_fusion_or_over_the_radio() -> None:
     assert radio.network.consensus_rounds == 7
     assert math.isinf(radio.network.radio_range)
     assert isinstance(radio.merging, LabelMatchedFusion)
-    views = tracker_of("lmb", "{kind: clmb, by_views: true, feedback: true}\nnetwork: {}")
+    views = tracker_of("lmb", "{kind: clmb, field_of_view_weighting: true, feedback: true}\nnetwork: {}")
     assert isinstance(views.fusion, Clmb)
-    assert views.fusion.by_views
-    own = tracker_of("m_delta_glmb", "{kind: cm_delta_glmb, feedback: true}\nnetwork: {loss: 0.2}")
+    assert views.fusion.field_of_view_weighting
+    own = tracker_of("m_delta_glmb", "{kind: cm_delta_glmb, feedback: true}\nnetwork: {link_loss_probability: 0.2}")
     assert isinstance(own.merging, CmDeltaGlmb)
 
 
@@ -93,7 +95,7 @@ def test_show_lists_messages_and_births() -> None:
         (FILTER, "kind: lmb"), (FUSION, "fusion: {kind: sequential}\nnetwork: {radio_range: 80.0}"), (SITES, MEASURED)
     )
     told = dict(summary_rows(parse_scenario(text, "f.yaml")))
-    assert told["network"] == "radio range 80 m, loss 0, delay 0"
+    assert told["network"] == "radio range 80 m, link loss probability 0, delay 0"
     assert told["births"] == "no site; 0.4 per scan from measurements"
 
 
@@ -114,7 +116,7 @@ def test_late_beliefs_and_late_births_warn(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(
     ("network", "feedback", "when"),
-    [("", "false", "without feedback"), ("", "true", None), ("network: {hops: 1}\n", "true", "over a network")],
+    [("", "false", "without feedback"), ("", "true", None), ("network: {max_hops: 1}\n", "true", "over a network")],
 )
 def test_labels_that_sensors_make_from_measurements_are_to_be_matched(network: str, feedback: str, when: Any) -> None:
     measured = "  from_measurements: {std: [5.0, 5.0, 2.0, 2.0]}\n"

@@ -72,7 +72,7 @@ sensor_defaults: {measurement: {kind: position}, noise: {kind: constant, std: [5
 sensors:
   - position: {lon: -1.13, lat: 50.77}
     platform: {kind: waypoints, speed: 5.0, points: [{lon: -1.13, lat: 50.77}, {lon: -1.10, lat: 50.78}]}
-  - {position: [10.0, 20.0], platform: {kind: courses, speed: 5.0, headings_deg: [0, 90]}}
+  - {position: [10.0, 20.0], platform: {kind: heading, speed: 5.0, headings_deg: [0, 90]}}
 control:
   decision_steps: [3]
   constraints:

@@ -35,8 +35,8 @@ SENSORS: list[dict[str, Any]] = [
         "name": "boat",
         "position": [0.0, -900.0],
         "heading_deg": 90.0,
-        "moves_from": "start",
-        "platform": {"kind": "courses", "speed": 8.0, "headings_deg": [90.0]},
+        "stationary_until_first_decision": False,
+        "platform": {"kind": "heading", "speed": 8.0, "headings_deg": [90.0]},
     },
 ]
 

@@ -162,7 +162,7 @@ def test_exchanged_longitude_and_latitude_are_reported(swapped: dict[str, float]
 
 def test_rows_of_one_turn_of_the_antenna_are_gathered() -> None:
     rows = [{**ROWS[0], "time": time, "range": 1000 + i} for i, time in enumerate((0.0, 1.0, 2.0, 5.0, 5.5))]
-    found = parsed(rows, gather=2.5)
+    found = parsed(rows, scan_window=2.5)
     assert found.times.tolist() == [0.0, 4.25]
     assert [len(scan) for scans in found.scans for scan in scans if scan is not None] == [3, 2]
     assert found.start == 1.0
@@ -201,7 +201,7 @@ def test_dates_are_utc() -> None:
         (ROWS, {"columns": {"range": "reach"}}, "expected a column 'reach'; got columns time, sensor"),
         (ROWS, {"columns": {"speed": "v"}}, "columns: expected quantities among time, sensor, bearing, range"),
         (ROWS, {"units": {"range": "ft"}}, "units.range: expected one of m, km, nmi; got ft"),
-        (ROWS, {"gather": -1.0}, "gather: expected seconds, at least 0; got -1.0"),
+        (ROWS, {"scan_window": -1.0}, "scan_window: expected seconds, at least 0; got -1.0"),
         (
             changed(0, own_lon=1.0, own_lat=2.0)[:1],
             {},
@@ -232,7 +232,7 @@ def folder(tmp_path: Path) -> Path:
 def test_a_recording_is_tracked_from_its_sensor_models_alone(folder: Path) -> None:
     made = scenario_from_recording(folder / "radars.yaml", folder / "scans.csv", folder / "truth.csv")
     assert list(made.assumed) == ["region", "motion", "survival", "birth", "clutter"]
-    record = run_scenario(made.scenario, "still", seed=0)
+    record = run_scenario(made.scenario, "stationary", seed=0)
     assert (record.planner, record.num_scans) == ("recorded", len(made.recording.times))
     np.testing.assert_allclose(record.poses[-1, 0, :2], RADARS["Calshot"][0], atol=5.0)
     last = made.recording.times[-1] + made.recording.start
@@ -250,7 +250,7 @@ def test_a_recording_is_tracked_from_its_sensor_models_alone(folder: Path) -> No
 def test_the_example_is_tracked() -> None:
     place = Path(__file__).parents[2] / "examples/recording"
     made = scenario_from_recording(place / "radars.yaml", place / "scans.csv", place / "truth.csv")
-    record = run_scenario(made.scenario, "still", seed=0)
+    record = run_scenario(made.scenario, "stationary", seed=0)
     assert (record.num_scans, record.estimates[-1].num_targets) == (195, 3)
     assert record.ospa[:, 0].mean() < 40.0
 
@@ -274,11 +274,11 @@ def test_zones_are_kept(folder: Path) -> None:
 
 def test_without_the_targets_reports_nothing_is_scored(folder: Path) -> None:
     made = scenario_from_recording(folder / "radars.yaml", folder / "scans.csv")
-    record = run_scenario(made.scenario, "still", seed=0)
+    record = run_scenario(made.scenario, "stationary", seed=0)
     assert np.isnan(record.ospa).all()
     assert set(table_of_run(record, made.scenario)["target"]) == {None}
     (folder / "kept.yaml").write_text(dump_scenario(made.scenario.model, folder=made.scenario.folder), "utf-8")
-    again = run_scenario(load_scenario(folder / "kept.yaml"), "still", seed=0)
+    again = run_scenario(load_scenario(folder / "kept.yaml"), "stationary", seed=0)
     for one, other in zip(record.estimates, again.estimates, strict=True):
         assert one.means.tobytes() == other.means.tobytes()
 
@@ -324,7 +324,11 @@ def test_a_recording_goes_with_no_decisions_and_no_invented_targets(folder: Path
     for old, new, message in (
         ("{kind: unknown}", "{kind: scripted, tracks: []}", "targets.kind: expected recorded or unknown"),
         ("decision_steps:\n", "decision_steps: [3]\n", "control: expected no decisions"),
-        ("planners: {}", "planners: {floor: {kind: told}}", r"planners\.floor\.kind: expected one that does not know"),
+        (
+            "planners: {}",
+            "planners: {floor: {kind: true_targets}}",
+            r"planners\.floor\.kind: expected one that does not know",
+        ),
     ):
         assert old in text
         (folder / "kept.yaml").write_text(text.replace(old, new), "utf-8")
@@ -339,7 +343,7 @@ def test_tracks_are_written_as_others_read_them(folder: Path) -> None:
     from pyarrow import parquet
 
     made = scenario_from_recording(folder / "radars.yaml", folder / "scans.csv", folder / "truth.csv")
-    columns = table_of_run(run_scenario(made.scenario, "still", seed=0), made.scenario)
+    columns = table_of_run(run_scenario(made.scenario, "stationary", seed=0), made.scenario)
     for ending in ("csv", "parquet", "geojson"):
         write_tracks(folder / "deep" / f"tracks.{ending}", columns)
     with (folder / "deep/tracks.csv").open(newline="") as file:
@@ -365,7 +369,7 @@ def test_a_ship_keeps_its_track_over_a_gap(folder: Path) -> None:
 
     silence(folder / "scans.csv", 45.0, 75.0)
     made = scenario_from_recording(folder / "radars.yaml", folder / "scans.csv", folder / "truth.csv")
-    record = run_scenario(made.scenario, "still", seed=0)
+    record = run_scenario(made.scenario, "stationary", seed=0)
     joins = joins_of_run(record, made.scenario)
     tables = [table_of_run(record, made.scenario, own) for own in ((), joins)]
     tracks = []
@@ -398,7 +402,7 @@ def test_a_globe_has_the_tracks_at_their_times(folder: Path) -> None:
     import json
 
     made = scenario_from_recording(folder / "radars.yaml", folder / "scans.csv", folder / "truth.csv")
-    columns = table_of_run(run_scenario(made.scenario, "still", seed=0), made.scenario)
+    columns = table_of_run(run_scenario(made.scenario, "stationary", seed=0), made.scenario)
     write_tracks(folder / "tracks.czml", columns)
     head, *packets = json.loads((folder / "tracks.czml").read_text("utf-8"))
     assert (head["id"], head["version"]) == ("document", "1.0")
@@ -423,7 +427,7 @@ def test_a_log_has_the_tracks_at_their_times(folder: Path) -> None:
 
     reader = pytest.importorskip("mcap.reader")  # which is not there for the newest Python
     made = scenario_from_recording(folder / "radars.yaml", folder / "scans.csv", folder / "truth.csv")
-    columns = table_of_run(run_scenario(made.scenario, "still", seed=0), made.scenario)
+    columns = table_of_run(run_scenario(made.scenario, "stationary", seed=0), made.scenario)
     write_tracks(folder / "tracks.mcap", columns)
     first = (folder / "tracks.mcap").read_bytes()
     write_tracks(folder / "tracks.mcap", columns)
@@ -523,8 +527,8 @@ def test_simulated_scans_are_written_as_they_are_read(tmp_path: Path, compass: s
     changes: dict[str, Any] = {
         "time.num_steps": 5,
         "control.decision_steps": [2],
-        "ospa.from_step": 1,
-        "ospa.to_step": 5,
+        "ospa.first_scan": 1,
+        "ospa.last_scan": 5,
     }
     changes |= {f"sensors.{s}.compass": True for s in {"all": (0, 1), "one": (1,), "none": ()}[compass]}
     scenario = replace_fields(load_scenario("paper-a"), changes)
@@ -548,12 +552,12 @@ def test_simulated_scans_are_written_as_they_are_read(tmp_path: Path, compass: s
 
 
 def test_a_scenario_sets_the_compass_convention(folder: Path) -> None:
-    text = (folder / "radars.yaml").read_text("utf-8").replace("bearings: north", "gather: 0.0")
+    text = (folder / "radars.yaml").read_text("utf-8").replace("bearings: north", "scan_window: 0.0")
     text = text.replace("sensor_defaults:\n", "sensor_defaults:\n  compass: true\n")
     (folder / "radars.yaml").write_text(text, "utf-8")
     made = scenario_from_recording(folder / "radars.yaml", folder / "scans.csv")
     (folder / "north.yaml").write_text(
-        text.replace("  compass: true\n", "").replace("gather: 0.0", "bearings: north"), "utf-8"
+        text.replace("  compass: true\n", "").replace("scan_window: 0.0", "bearings: north"), "utf-8"
     )
     said = scenario_from_recording(folder / "north.yaml", folder / "scans.csv")
     for one, other in zip(made.recording.scans, said.recording.scans, strict=True):
@@ -572,16 +576,18 @@ def test_a_bias_of_a_compass_is_the_same_simulated_and_read(tmp_path: Path) -> N
     changes: dict[str, Any] = {
         "time.num_steps": 3,
         "control.decision_steps": [2],
-        "ospa.from_step": 1,
-        "ospa.to_step": 3,
+        "ospa.first_scan": 1,
+        "ospa.last_scan": 3,
     }
     changes |= {"sensors.*.compass": True, "sensors.*.noise": {"kind": "constant", "std": [1e-9, 1e-6]}}
-    biased = replace_fields(load_scenario("paper-a"), {**changes, "sensors.*.truth": {"bias": {"bearing_deg": 5.0}}})
+    biased = replace_fields(
+        load_scenario("paper-a"), {**changes, "sensors.*.true_parameters": {"bias": {"bearing_deg": 5.0}}}
+    )
     honest = replace_fields(load_scenario("paper-a"), changes)
-    write_tracks(tmp_path / "scans.csv", scan_table(run_scenario(biased, "still", seed=3), biased))
+    write_tracks(tmp_path / "scans.csv", scan_table(run_scenario(biased, "stationary", seed=3), biased))
     known = replace_fields(honest, {"sensors.*.bias.bearing_deg": 5.0})
     found = parse_scans(read_table(tmp_path / "scans.csv"), recorded_sensors(known.model), Conventions({}, {}))
-    drawn = scans_of_record(run_scenario(honest, "still", seed=3), honest)
+    drawn = scans_of_record(run_scenario(honest, "stationary", seed=3), honest)
     for scans, expected in zip(found.scans, drawn, strict=True):
         for scan, other in zip(scans, expected, strict=True):
             assert scan is not None
@@ -653,7 +659,11 @@ def test_equal_positions_may_be_given_twice() -> None:
     ("old", "new", "words"),
     [
         ("bearings: north", "bearings: North", r"recording.bearings: expected one of east, north, got \"North\""),
-        ("bearings: north", "bearings: north, gather: -1", "recording.gather: expected a number of at least 0"),
+        (
+            "bearings: north",
+            "bearings: north, scan_window: -1",
+            "recording.scan_window: expected a number of at least 0",
+        ),
         ("bearings: north", "bearings: north, units: 3", "recording.units: expected a mapping"),
         ("bearings: north", "bearings: north, columns: {range: 3}", "recording.columns"),
         ("bearings: north", "bearings: north, units: {range: [nmi]}", "recording.units"),

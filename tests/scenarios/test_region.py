@@ -57,7 +57,7 @@ def recorded(folder: Path, scans: list[str], detection: str = ENDLESS, more: str
 
 def ospa(found: RecordingScenario) -> Floats:
     """OSPA of each scan."""
-    return run_scenario(found.scenario, "still", seed=0).ospa[:, 0]
+    return run_scenario(found.scenario, "stationary", seed=0).ospa[:, 0]
 
 
 WILD = [(6100.0, 45.0), (6700.0, 222.0), (7500.0, 45.0), (9000.0, 135.0), (12e3, 45.0), (3e5, 12.0), (3e6, 301.0)]

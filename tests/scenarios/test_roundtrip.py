@@ -23,7 +23,7 @@ ODD: dict[str, Any] = {"~": None, "no": [1, 2], "1e3": "0x1F", "a: b": True, " Ã
 MORE: dict[str, Any] = {
     "control.detection_threshold": 0.35,
     "control.reward": {"kind": "cauchy_schwarz", "unit_volume": 1e-7},
-    "control.search": {"kind": "cross_entropy", "num_samples": 10**6, "elite_share": 0.1, "smoothing": 0.3},
+    "control.search": {"kind": "cross_entropy", "num_samples": 10**6, "elite_fraction": 0.1, "smoothing": 0.3},
     "estimator": {"kind": "marginal", "threshold": 1e-6},
     "filter.limits": {"max_existence": 1.0 - 1e-6, "gate_probability": 0.5, "max_hypotheses": 10**6},
     "fusion.missing_weight": 1e-6,

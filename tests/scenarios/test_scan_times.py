@@ -18,9 +18,9 @@ from vedette.simulation.replay import scans_of
 
 def of(**fields: Any) -> Any:
     """A short scenario; sections of scan times are whole, as a field by its path must be."""
-    whole: dict[str, Any] = {"every": 1, "first": 1, "period": None, "offset": None, "drop_out": None}
+    whole: dict[str, Any] = {"every": 1, "first": 1, "period": None, "offset": None, "scan_loss_probability": None}
     given = {path: {**whole, **value} for path, value in fields.items()}
-    short = {"time.num_steps": 12, "control.decision_steps": [4], "ospa.from_step": None, "ospa.to_step": None}
+    short = {"time.num_steps": 12, "control.decision_steps": [4], "ospa.first_scan": None, "ospa.last_scan": None}
     return replace_fields(load_scenario("paper-e"), {**short, **given})
 
 
@@ -29,7 +29,7 @@ def test_periods_in_seconds_are_those_in_steps() -> None:
     steps = of(**{"sensors.1.scans": {"every": 3, "first": 3}})
     np.testing.assert_array_equal(build_scan_times(seconds), build_scan_times(steps))
     assert np.flatnonzero(build_scan_times(seconds)[1]).tolist() == [2, 5, 8, 11]
-    one, other = (run_scenario(each, "still", seed=1) for each in (seconds, steps))
+    one, other = (run_scenario(each, "stationary", seed=1) for each in (seconds, steps))
     assert all(a.means.tobytes() == b.means.tobytes() for a, b in zip(one.estimates, other.estimates, strict=True))
 
 
@@ -40,9 +40,9 @@ def test_scans_drop_out_at_the_given_probability_and_equally_for_every_strategy(
     assert there[:, 0].all()
     assert there[:, 1].mean() == pytest.approx(0.7, abs=4.0 * np.sqrt(0.21 / 4000.0))
     assert (there[0] != there[1]).any()
-    scenario = of(**{"sensors.*.scans": {"drop_out": 0.4}})
+    scenario = of(**{"sensors.*.scans": {"scan_loss_probability": 0.4}})
     experiment = build_experiment(scenario)
-    moved, still = (run_scenario(scenario, planner, seed=2, num_threads=1) for planner in ("fixed", "still"))
+    moved, still = (run_scenario(scenario, planner, seed=2, num_threads=1) for planner in ("constant", "stationary"))
     dropped = []
     for record in (moved, still):
         scans = scans_of(record, experiment)
@@ -52,8 +52,8 @@ def test_scans_drop_out_at_the_given_probability_and_equally_for_every_strategy(
 
 
 def test_a_run_equals_the_tracker_on_the_scans_that_took_place() -> None:
-    scenario = of(**{"sensors.*.scans": {"drop_out": 0.4}})
-    experiment, record = build_experiment(scenario), run_scenario(scenario, "still", seed=2)
+    scenario = of(**{"sensors.*.scans": {"scan_loss_probability": 0.4}})
+    experiment, record = build_experiment(scenario), run_scenario(scenario, "stationary", seed=2)
     state = experiment.tracker.initial()
     rngs = [np.random.default_rng(0)] * experiment.num_sensors
     for k, scans in enumerate(scans_of(record, experiment)):
@@ -73,7 +73,7 @@ def test_a_run_equals_the_tracker_on_the_scans_that_took_place() -> None:
         ({"period": 3.0, "every": 3}, r"scans.period: expected either every and first, or period and offset, got both"),
         ({"period": 0.4}, r"scans.period: expected a multiple of time.step_period"),
         ({"period": 40.0, "offset": 20.0}, r"scans.offset: expected a step up to the last, 12"),
-        ({"drop_out": 1.0}, r"scans.drop_out: expected a number below 1"),
+        ({"scan_loss_probability": 1.0}, r"scans.scan_loss_probability: expected a number below 1"),
     ],
 )
 def test_impossible_times_are_reported(scans: Any, message: str) -> None:
@@ -85,5 +85,6 @@ def test_filters_that_go_on_from_each_scan_have_no_drop_outs() -> None:
     scenario = load_scenario("linear-10")
     with pytest.raises(ScenarioError, match="scans: expected every step, as phd filters go on from each scan"):
         replace_fields(
-            scenario, {"filter": {"kind": "phd"}, "fusion": {"kind": "none"}, "sensors.*.scans.drop_out": 0.1}
+            scenario,
+            {"filter": {"kind": "phd"}, "fusion": {"kind": "none"}, "sensors.*.scans.scan_loss_probability": 0.1}
         )

@@ -56,11 +56,11 @@ def test_several_returns_warn_and_are_merged(tmp_path: Path) -> None:
     plain = recorded(tmp_path, 4.0)
     (line,) = [line for line in scenario_warnings(plain.scenario) if "recording: {merge: 4.0}" in line]
     assert "R: 40 of 40 scans have measurements within 3 standard deviations of each other" in line
-    apart = run_scenario(plain.scenario, "still", seed=0)
+    apart = run_scenario(plain.scenario, "stationary", seed=0)
     found = recorded(tmp_path, 4.0, ", merge: 4.0")
     (line,) = [line for line in scenario_warnings(found.scenario) if "merged into" in line]
     assert "its noise should cover that" in line
-    record = run_scenario(found.scenario, "still", seed=0)
+    record = run_scenario(found.scenario, "stationary", seed=0)
     assert found.recording.num_measurements < 0.5 * plain.recording.num_measurements
     numbers = [np.mean([len(each.labels) for each in run.estimates[10:]]) for run in (apart, record)]
     assert numbers[0] > 4.0
@@ -98,7 +98,7 @@ MIXED = np.array([[2000.0, 3000.0, 2.0, -1.0], [-4000.0, 1000.0, 0.0, 3.0], [900
 
 def test_unexplained_measurements_of_fast_targets_are_reported(tmp_path: Path) -> None:
     found = recorded(tmp_path, 1.0, targets=MIXED)
-    (line,) = unexplained_course_warnings(run_scenario(found.scenario, "still", seed=0), found.scenario)
+    (line,) = unexplained_course_warnings(run_scenario(found.scenario, "stationary", seed=0), found.scenario)
     speed = math.hypot(200.0, 100.0)
     low, high = (float(word) for word in line.split("courses at ")[1].split(" m/s")[0].split(" to "))
     assert low == pytest.approx(speed, rel=0.03)
@@ -107,7 +107,7 @@ def test_unexplained_measurements_of_fast_targets_are_reported(tmp_path: Path) -
     assert re.match(rf"R: \d+ measurements that no track explains {where}", line)
     assert "new tracks are expected at about 10 m/s: give `--max-target-speed 250`" in line
     fast = scenario_from_recording(tmp_path / "radar.yaml", tmp_path / "scans.csv", speed=300.0)
-    assert unexplained_course_warnings(run_scenario(fast.scenario, "still", seed=0), fast.scenario) == ()
+    assert unexplained_course_warnings(run_scenario(fast.scenario, "stationary", seed=0), fast.scenario) == ()
 
 
 def test_clutter_alone_is_not_taken_for_fast_targets(tmp_path: Path) -> None:
@@ -118,4 +118,4 @@ def test_clutter_alone_is_not_taken_for_fast_targets(tmp_path: Path) -> None:
     (tmp_path / "scans.csv").write_text("\n".join([*rows, ""]), "utf-8")
     (tmp_path / "radar.yaml").write_text(SENSORS % "", "utf-8")
     found = scenario_from_recording(tmp_path / "radar.yaml", tmp_path / "scans.csv")
-    assert unexplained_course_warnings(run_scenario(found.scenario, "still", seed=0), found.scenario) == ()
+    assert unexplained_course_warnings(run_scenario(found.scenario, "stationary", seed=0), found.scenario) == ()

@@ -142,7 +142,7 @@ def test_results_of_earlier_versions_are_read(folder: Path) -> None:
 
 
 def test_a_simulated_run_without_its_tables_of_decisions_is_refused(folder: Path) -> None:
-    save_run(run_scenario(load_scenario("linear-10"), "still", seed=0), folder / "run")
+    save_run(run_scenario(load_scenario("linear-10"), "stationary", seed=0), folder / "run")
     manifest = json.loads((folder / "run/manifest.json").read_text())
     del manifest["files"]["decisions.arrow"]
     (folder / "run/manifest.json").write_text(json.dumps(manifest))

@@ -22,10 +22,10 @@ POSITIONS = (
 )
 TRUTH = """heading_deg: 30.0
     detection: {kind: limited_range, probability: 0.9, max_range: 60.0}
-    truth:
-      noise: {kind: by_axis, std: [1.0, 1.0], growth: [1e-5, 1e-5]}
+    true_parameters:
+      noise: {kind: by_axis, std: [1.0, 1.0], quadratic_growth: [1e-5, 1e-5]}
       detection:
-        {kind: soft_sector, probability: 0.9801, max_range: 60.0, range_slope: 1.0, angle_slope: 20.0, cut: true}
+        {kind: soft_sector, probability: 0.9801, max_range: 60.0, range_slope: 1.0, angle_slope: 20.0, hard_limit: true}
       clutter: {kind: around_sensor, rate: 1.25, half_side: 2000.0, half_width_deg: 45.0}
       first_detection: {kind: limited_range, probability: 1.0, max_range: 1000.0}
       detection_of: measurement
@@ -76,7 +76,7 @@ def test_it_reads_back_as_it_is_written_and_defaults_are_shared() -> None:
     model = parse_scenario(FILE)
     assert parse_scenario(dump_scenario(model)) == model
     shared = changed(
-        ("sensor_defaults:\n", "sensor_defaults:\n  truth: {detection: {kind: constant, probability: 0.5}}\n")
+        ("sensor_defaults:\n", "sensor_defaults:\n  true_parameters: {detection: {kind: constant, probability: 0.5}}\n")
     )
     true = experiment_of(shared).true_sensors
     assert [sensor.model.detection.params[0] for sensor in true] == [0.5, 0.5]
@@ -90,7 +90,7 @@ def test_a_custom_measurement_replaces_that_of_the_filters(tmp_path: Path) -> No
         "    out[0], out[1] = state[0] + params[0], state[1]\n\n"
         "def shifted(by):\n    return models.MeasurementModel(2, off, [by])\n"
     )
-    own = "truth: {measurement: {kind: custom, function: 'own.py:shifted', arguments: {by: 7.0}}}"
+    own = "true_parameters: {measurement: {kind: custom, function: 'own.py:shifted', arguments: {by: 7.0}}}"
     file = tmp_path / "scene.yaml"
     file.write_text(changed(*POSITIONS, ("heading_deg: 4.0", own)))
     model = parse_scenario(file.read_text(), folder=tmp_path)

@@ -67,15 +67,15 @@ def test_no_turn_is_found_where_nothing_turns(seed: int) -> None:
     assert found_turn(times[:10], rng.uniform(-math.pi, math.pi, 10)) is None
 
 
-@pytest.mark.parametrize(("gather", "warned"), [(4.0, True), (0.0, False), (0.1, False)])
+@pytest.mark.parametrize(("scan_window", "warned"), [(4.0, True), (0.0, False), (0.1, False)])
 def test_rows_grouped_over_too_long_a_time_warn(tmp_path: Path, gather: float, warned: bool) -> None:
     flights = Flights(np.random.default_rng(4), 6, 0.0)
     write(tmp_path, {"R": flights.rows((0.0, 0.0), Turn(4.0), 0.0, True)}, {"R": (0.0, 0.0)})
     sensors = tmp_path / "radars.yaml"
-    text = sensors.read_text("utf-8").replace("east}", f"east, turns: none, gather: {gather}}}")
+    text = sensors.read_text("utf-8").replace("east}", f"east, turns: none, scan_window: {gather}}}")
     sensors.write_text(text, "utf-8")
     found = scenario_from_recording(sensors, tmp_path / "scans.csv", speed=250.0)
-    told = [words for path, words in recording_warnings(found.scenario) if path == ("recording", "gather")]
+    told = [words for path, words in recording_warnings(found.scenario) if path == ("recording", "scan_window")]
     assert bool(told) is warned
     if warned:
         assert re.match(r"R: rows of one scan are [23]\.\d+ s apart \(median\), in which a target of 250 m/s", told[0])
@@ -202,7 +202,7 @@ targets:
 sensors:
   - position: [0.0, 0.0]
     turn: {period: 5.0}
-    platform: {kind: courses, speed: 30.0, headings_deg: [0.0, 90.0, 180.0, 270.0]}
+    platform: {kind: heading, speed: 30.0, headings_deg: [0.0, 90.0, 180.0, 270.0]}
     noise: {kind: constant, std: [0.002, 40.0]}
     detection: {kind: constant, probability: 0.95}
     clutter: {kind: region, rate: 2.0}

@@ -26,11 +26,11 @@ from vedette.tracking import Central, Distributed, UndetectedTargetTracker
 
 SHORT = (
     ("num_steps: 20", "num_steps: 6"),
-    ("to_step: 20", "to_step: 6"),
+    ("last_scan: 20", "last_scan: 6"),
     ("[4, 8]", "[2]"),
     ("end_step: 18", "end_step: 6"),
 )
-WHOLE = "{cell: 30.0, expected: 5.0, birth_rate: 0.02, enters: border, speed: 4.0, survival: 0.99}"
+WHOLE = "{cell_size: 30.0, expected: 5.0, birth_rate: 0.02, birth_density: boundary, speed: 4.0, survival: 0.99}"
 
 
 def scenario(undetected: str, *changes: tuple[str, str]) -> Scenario:
@@ -43,26 +43,26 @@ def test_the_tracker_searches() -> None:
     assert isinstance(tracker.tracker, Distributed)
     model = tracker.model
     assert model.grid == CellGrid(Region(-100.0, 100.0, -50.0, 50.0), 7, 4)
-    told = (model.expected, model.birth_rate, model.enters, model.speed, model.survival)
-    assert told == (5.0, 0.02, "border", 4.0, 0.99)
+    told = (model.expected, model.birth_rate, model.birth_density, model.speed, model.survival)
+    assert told == (5.0, 0.02, "boundary", 4.0, 0.99)
     assert isinstance(build_experiment(Scenario(parse_scenario(MINIMAL), Path("f.yaml"))).tracker, Distributed)
-    worth = scenario(WHOLE, ("control: {", "control: {undetected_worth: 3.0, "))
-    assert worth.model.control.undetected_worth == 3.0
+    worth = scenario(WHOLE, ("control: {", "control: {undetected_target_value: 3.0, "))
+    assert worth.model.control.undetected_target_value == 3.0
 
 
 def test_a_region_of_their_own() -> None:
-    own = "{cell: 10.0, expected: 1.0, speed: 0.0, region: {x_min: 0.0, x_max: 40.0, y_min: 0.0, y_max: 50.0}}"
+    own = "{cell_size: 10.0, expected: 1.0, speed: 0.0, region: {x_min: 0.0, x_max: 40.0, y_min: 0.0, y_max: 50.0}}"
     tracker: Any = build_experiment(scenario(own)).tracker
     assert tracker.model.grid == CellGrid(Region(0.0, 40.0, 0.0, 50.0), 4, 5)
-    assert (tracker.model.birth_rate, tracker.model.enters, tracker.model.survival) == (0.0, "anywhere", None)
+    assert (tracker.model.birth_rate, tracker.model.birth_density, tracker.model.survival) == (0.0, "uniform", None)
     told = dict(summary_rows(scenario(own).model))["not yet found"]
-    assert told == ("cell 10 m, expected 1, enters anywhere, speed 0 m/s, in x 0 to 40 m, y 0 to 50 m")
+    assert told == ("cell size 10 m, expected 1, birth density uniform, speed 0 m/s, in x 0 to 40 m, y 0 to 50 m")
     assert "not yet found" not in dict(summary_rows(parse_scenario(MINIMAL)))
 
 
 def test_defaults_are_those_of_the_library() -> None:
     fields = UndetectedSection.model_fields
-    for name in ("enters", "survival"):
+    for name in ("birth_density", "survival"):
         assert fields[name].default == UndetectedModel.__dataclass_fields__[name].default
 
 
@@ -72,7 +72,7 @@ def test_it_is_written_out_and_read_back() -> None:
 
 
 def test_as_many_cells_as_are_allowed() -> None:
-    model = scenario("{cell: 0.285, expected: 1.0, speed: 1.0}").model
+    model = scenario("{cell_size: 0.285, expected: 1.0, speed: 1.0}").model
     assert model.undetected is not None
     grid = model.undetected.build(model.region).grid
     assert 0.98 * MAX_CELLS < grid.num_cells <= MAX_CELLS
@@ -88,7 +88,7 @@ def test_a_field_of_view_below_half_a_cell_warns() -> None:
 
 def test_a_run_is_the_same_with_and_without() -> None:
     alone = Scenario(parse_scenario(changed(*SHORT)), Path("f.yaml"))
-    for planner in ("fixed", "random"):
+    for planner in ("constant", "random"):
         mine, other = (run_scenario(one, planner, seed=3) for one in (scenario(WHOLE, *SHORT), alone))
         assert mine.poses.tobytes() == other.poses.tobytes()
         for estimate, another in zip(mine.estimates, other.estimates, strict=True):
@@ -116,12 +116,12 @@ def test_check_show_and_run_from_the_command_line(tmp_path: Path) -> None:
     shown = runner.invoke(app, ["show", str(file)], env={"COLUMNS": "200"})
     assert shown.exit_code == 0, shown.output
     assert "not yet found" in shown.output
-    done = runner.invoke(app, ["run", str(file), "--planner", "fixed", "--out", str(tmp_path / "run.npz")])
+    done = runner.invoke(app, ["run", str(file), "--planner", "constant", "--out", str(tmp_path / "run.npz")])
     assert done.exit_code == 0, done.output
-    file.write_text(f"{MINIMAL}undetected: {{cell: 0.01, expected: 5.0, speed: 1.0}}\n")
+    file.write_text(f"{MINIMAL}undetected: {{cell_size: 0.01, expected: 5.0, speed: 1.0}}\n")
     refused = runner.invoke(app, ["check", str(file)])
     assert refused.exit_code == 1
-    assert "undetected.cell: expected at least 0.285" in refused.output
+    assert "undetected.cell_size: expected at least 0.285" in refused.output
 
 
 ONE = (
@@ -137,16 +137,16 @@ def test_beliefs_with_an_intensity_need_no_section() -> None:
     assert isinstance(tracker, Central)
     found = tracker.targets.birth.anywhere
     assert found is not None
-    assert (found.expected, found.birth_rate, found.enters, found.speed, found.survival) == (
+    assert (found.expected, found.birth_rate, found.birth_density, found.speed, found.survival) == (
         5.0,
         0.02,
-        "border",
+        "boundary",
         4.0,
         0.99,
     )
-    without: Any = build_experiment(scenario("{cell: 30.0, expected: 0.0, speed: 4.0}", *ONE, BORN)).tracker
+    without: Any = build_experiment(scenario("{cell_size: 30.0, expected: 0.0, speed: 4.0}", *ONE, BORN)).tracker
     assert without.targets.birth.anywhere.birth_rate == "learnt"
-    at_sites: Any = build_experiment(scenario("{cell: 30.0, expected: 0.0, speed: 4.0}", *ONE)).tracker
+    at_sites: Any = build_experiment(scenario("{cell_size: 30.0, expected: 0.0, speed: 4.0}", *ONE)).tracker
     assert at_sites.targets.birth.anywhere.birth_rate == 0.0
     state: Any = tracker.initial()
     assert state.undetected.total == pytest.approx(5.0)
@@ -184,7 +184,7 @@ def test_planners_search_without_a_section() -> None:
     sight = "  detection: {kind: limited_range, probability: 0.9, max_range: 20.0}"
     near = ("sensor_defaults:", f"sensor_defaults:\n{sight}")
     assert anywhere(*ONE, BORN, near)[0].grid.num_cells > 16 * 16
-    for more in ((ONE[1], BORN), ONE, (*ONE, BORN, ("control: {", "control: {undetected_worth: 0.0, "))):
+    for more in ((ONE[1], BORN), ONE, (*ONE, BORN, ("control: {", "control: {undetected_target_value: 0.0, "))):
         assert anywhere(*more) == (None, False)
     of_sites, told = anywhere(*ONE, near)  # where a view has an edge
     assert (of_sites.birth_rate, of_sites.expected, told) == (0.0, 0.0, True)
@@ -192,7 +192,7 @@ def test_planners_search_without_a_section() -> None:
     given = Scenario(parse_scenario(changed(*SHORT, *ONE, BORN)), Path("f.yaml"))
     record = run_scenario(given, "jdm", seed=1)
     assert any(decision.plan.explain().of_undetected for decision in record.decisions)
-    wild = changed(*ONE, BORN, ("control: {", "control: {undetected_worth: 10000.0, "))
+    wild = changed(*ONE, BORN, ("control: {", "control: {undetected_target_value: 10000.0, "))
     assert "a factor of that cost" in "".join(scenario_warnings(Scenario(parse_scenario(wild), Path("f.yaml"))))
 
 
@@ -201,7 +201,7 @@ def test_an_unexplained_measurement_starts_a_track_by_the_odds_of_the_intensity(
     existence = []
     for expected in (5.0, 0.5):
         tracker: Any = build_experiment(
-            scenario(f"{{cell: 30.0, expected: {expected}, speed: 4.0}}", *ONE, BORN)
+            scenario(f"{{cell_size: 30.0, expected: {expected}, speed: 4.0}}", *ONE, BORN)
         ).tracker
         place = np.array([60.0, 20.0])
         measured = tracker.sensors[0].measurement
@@ -227,7 +227,7 @@ def test_detection_is_its_mean_where_undetected_targets_are_an_intensity() -> No
 
 def test_where_no_track_starts_from_measurements_estimates_are_the_same() -> None:
     mine, other = (
-        run_scenario(Scenario(parse_scenario(changed(*SHORT, *ONE) + more), Path("f.yaml")), "fixed", seed=3)
+        run_scenario(Scenario(parse_scenario(changed(*SHORT, *ONE) + more), Path("f.yaml")), "constant", seed=3)
         for more in (f"undetected: {WHOLE}\n", "")
     )
     for estimate, another in zip(mine.estimates, other.estimates, strict=True):
@@ -235,7 +235,7 @@ def test_where_no_track_starts_from_measurements_estimates_are_the_same() -> Non
 
 
 def test_a_birth_rate_is_learnt() -> None:
-    rate = "{cell: 30.0, expected: 1.0, birth_rate: learnt, speed: 4.0}"
+    rate = "{cell_size: 30.0, expected: 1.0, birth_rate: learnt, speed: 4.0}"
     found: Any = build_experiment(scenario(rate, *ONE, BORN)).tracker.targets.birth.anywhere
     assert (found.birth_rate, found.prior_rate) == ("learnt", pytest.approx(0.4))  # .2 a scan of .5 s
     given = build_experiment(scenario(rate.replace("learnt", "learnt, prior_rate: 0.7"), *ONE, BORN))
@@ -251,7 +251,7 @@ def test_a_birth_rate_is_learnt() -> None:
     told = dict(summary_rows(parse_scenario(changed(*ONE, born))))
     assert told["births"] == "1 site, steps 1, 5; at a learnt rate from measurements"
     assert dict(summary_rows(scenario(rate, *ONE, BORN).model))["not yet found"].startswith(
-        "cell 30 m, expected 1, birth rate learnt"
+        "cell size 30 m, expected 1, birth rate learnt"
     )
     with pytest.raises(ScenarioError, match=r"from_measurements\.expected: expected a number, as only one belief"):
         parse_scenario(changed(ONE[1], born, ("m_delta_glmb", "lmb")))

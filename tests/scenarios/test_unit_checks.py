@@ -239,7 +239,10 @@ def test_areas_in_metres_do_not_warn(scale: float) -> None:
         ({"control.horizon_period": 3.0}, True),
         ({"control.horizon_period": 2.0}, False),
         ({"control.horizon_period": 3.0, "control.decision_steps": []}, False),
-        ({"control.horizon_period": 3.0, "motion": {"kind": "constant_velocity", "acceleration": "continuous"}}, False),
+        (
+            {"control.horizon_period": 3.0, "motion": {"kind": "constant_velocity", "noise_model": "continuous_white"}},
+            False,
+        ),
         ({"control.horizon_period": 3.0, "motion": {"kind": "constant_velocity", "sigma_v": 0.0}}, False),
         ({"time.step_period": 0.1}, False),  # the horizon goes scan by scan
     ],

@@ -24,7 +24,7 @@ def paper_a(tmp_path: Path, *constraints: Any) -> Scenario:
     return replace_fields(load_scenario("paper-a"), {**fields, "fusion.kind": "clmb"})
 
 
-@pytest.mark.parametrize("strategy", ["fixed", "last"])
+@pytest.mark.parametrize("strategy", ["constant", "last"])
 def test_plans_name_the_sensors_and_constraints_that_they_violate(strategy: str, tmp_path: Path) -> None:
     record = run_scenario(paper_a(tmp_path, ZONE, APART), strategy, seed=0)
     for decision in record.decisions:
@@ -50,5 +50,5 @@ def test_independent_decisions_keep_to_zones_and_report_pair_violations(tmp_path
 
 def test_satisfied_constraints_are_not_reported(tmp_path: Path) -> None:
     fence = {"kind": "stay_inside", "region": {"x_min": -1e4, "x_max": 1e4, "y_min": -1e4, "y_max": 1e4}}
-    for strategy in ("fixed", "last"):
+    for strategy in ("constant", "last"):
         assert run_scenario(paper_a(tmp_path, fence), strategy, seed=0).decisions[0].plan.notes == ()

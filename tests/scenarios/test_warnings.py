@@ -24,7 +24,7 @@ from vedette.scenarios.warnings import prob_detection, scenario_warnings
 
 SOFT: dict[str, object] = {"kind": "soft_sector", "probability": 0.9, "max_range": 150.0, "range_slope": 0.05}
 
-COURSES = "{kind: courses, speed: 5.0, headings_deg: [0.0, 90.0]}"
+COURSES = "{kind: heading, speed: 5.0, headings_deg: [0.0, 90.0]}"
 STEPS = ("steps: [1, 5]", "steps: [1]")
 SECTOR = "detection: {kind: limited_sector, probability: 0.9, max_range: 60.0, half_width_deg: 40.0}"
 
@@ -41,7 +41,7 @@ def of(folder: Path, *changes: tuple[str, str]) -> tuple[str, ...]:
         (COURSES, "{kind: keep_out, polygon: [[-9, 30], [9, 30], [9, 50], [-9, 50]]}", "keep it out of"),
         (COURSES, "{kind: stay_inside, region: {x_min: 5, x_max: 9, y_min: 0, y_max: 50}}", "keep it inside"),
         (COURSES, "{kind: keep_out, polygon: [[9, 30], [19, 30], [19, 50], [9, 50]]}", ""),
-        ("{kind: still}", "{kind: keep_out, polygon: [[-9, 30], [9, 30], [9, 50], [-9, 50]]}", ""),
+        ("{kind: stationary}", "{kind: keep_out, polygon: [[-9, 30], [9, 30], [9, 50], [-9, 50]]}", ""),
         (COURSES, "{kind: keep_out, polygon: [[0, 30], [9, 30], [9, 50], [0, 50]]}", "on the edge of an area that"),
         (COURSES, "{kind: keep_out, polygon: [[-9, 30], [0, 30], [0, 50], [-9, 50]]}", "on the edge of an area that"),
         (COURSES, "{kind: keep_out, polygon: [[0, 40], [9, 40], [9, 50], [0, 50]]}", "on the edge of an area that"),
@@ -108,9 +108,10 @@ def test_fields_of_view_warning_suggests_alternatives(tmp_path: Path, kind: str,
     loses = {"clmb": "GCI", "arithmetic_average": "the arithmetic average"}[kind]
     assert (
         f"{loses} loses what one sensor sees and another does not; take fusion: {{kind: sequential}} where scans can "
-        f"be sent; {parallel}fusion: {{kind: {kind}, by_views: true}} where sensors do not share a prediction"
+        f"be sent; {parallel}fusion: {{kind: {kind}, field_of_view_weighting: true}} where sensors do not share a "
+        "prediction"
     ) in line
-    assert of(tmp_path, STEPS, blind, (rule, f"{{kind: {kind}, by_views: true}}")) == ()
+    assert of(tmp_path, STEPS, blind, (rule, f"{{kind: {kind}, field_of_view_weighting: true}}")) == ()
 
 
 CURE = re.compile(r"(fusion): (\{[^}]*\})|((?:fusion|filter)\.[a-z]+): ([a-z_]+)")
@@ -145,7 +146,7 @@ def test_every_suggestion_is_accepted_and_runs(filters: str, number: int, births
         ({"kind": "cm_delta_glmb"}, None),
         ({"kind": "clmb", "feedback": True}, None),
         ({"kind": "cm_delta_glmb", "feedback": True}, None),
-        ({"kind": "arithmetic_average", "by_views": True, "feedback": True}, None),
+        ({"kind": "arithmetic_average", "field_of_view_weighting": True, "feedback": True}, None),
         ({"kind": "parallel"}, None),
         ({"kind": "clmb", "feedback": True, "matching": "assignment"}, {"delay": 1}),
         ({"kind": "cm_delta_glmb", "feedback": True, "matching": "assignment"}, {"consensus_rounds": 2}),
@@ -158,17 +159,17 @@ def test_every_suggestion_is_accepted_and_runs(filters: str, number: int, births
             continue
         for fields in cures(scenario_warnings(scene)):
             named += 1
-            run_scenario(replace_fields(scene, fields), "still", seed=1, num_threads=1)
+            run_scenario(replace_fields(scene, fields), "stationary", seed=1, num_threads=1)
     assert named >= 4
 
 
 def test_fusing_many_densities_warns_with_the_cost() -> None:
     (line,) = scenario_warnings(
-        scene_of("factored_glmb", {"kind": "clmb", "by_views": True, "feedback": True}, 5, "sites", None)
+        scene_of("factored_glmb", {"kind": "clmb", "field_of_view_weighting": True, "feedback": True}, 5, "sites", None)
     )
     assert "5 sensors fuse densities by GCI, which makes no use of what they have in common" in line
     assert "take fusion: {kind: sequential} where scans can be sent; fusion: {kind: parallel} where only" in line
-    own = {"kind": "arithmetic_average", "by_views": True, "matching": "assignment"}
+    own = {"kind": "arithmetic_average", "field_of_view_weighting": True, "matching": "assignment"}
     (line,) = scenario_warnings(scene_of("factored_glmb", own, 5, "measured", None))
     assert "each finds every target by itself, and anew where one comes into its view" in line
     (line,) = scenario_warnings(scene_of("lmb", {"kind": "parallel"}, 5, "measured", None))
@@ -176,7 +177,7 @@ def test_fusing_many_densities_warns_with_the_cost() -> None:
     for filters, fusion, number in (
         ("factored_glmb", {"kind": "parallel"}, 5),
         ("lmb", {"kind": "parallel"}, 4),
-        ("factored_glmb", {"kind": "clmb", "by_views": True, "feedback": True}, 4),
+        ("factored_glmb", {"kind": "clmb", "field_of_view_weighting": True, "feedback": True}, 4),
     ):
         assert scenario_warnings(scene_of(filters, fusion, number, "measured", None)) == ()
 
@@ -224,7 +225,7 @@ def test_limited_fields_of_view_warn_if_sensors_move(tmp_path: Path, decisions: 
         STEPS,
         ("decision_steps: [4, 8]", f"decision_steps: {decisions}"),
         (same, f"{same}\n  detection: {{kind: limited_range, probability: 0.9, max_range: 160.0}}"),
-        ("heading_deg: 4.0", "platform: {kind: courses, speed: 4.0}"),
+        ("heading_deg: 4.0", "platform: {kind: heading, speed: 4.0}"),
     )
     assert len(found) == number
     assert all("sensors that move or turn and see only so far" in line for line in found)
@@ -239,10 +240,10 @@ def test_limited_fields_of_view_warn_if_sensors_move(tmp_path: Path, decisions: 
         {"kind": "limited_sector", "probability": 0.9, "max_range": 150.0, "half_width_deg": 70.0},
         {"kind": "limited_range", "probability": 0.9, "max_range": 150.0, "outside": 0.2},
         {"kind": "limited_sector", "probability": 0.9, "max_range": 150.0, "half_width_deg": 70.0, "outside": 0.2},
-        {**SOFT, "angle_slope": 20.0, "cut": True},
+        {**SOFT, "angle_slope": 20.0, "hard_limit": True},
         {**SOFT, "angle_slope": 5.0, "half_width_deg": 70.0},
         {**SOFT, "half_width_deg": 70.0},
-        {**SOFT, "half_width_deg": 70.0, "cut": True},
+        {**SOFT, "half_width_deg": 70.0, "hard_limit": True},
         SOFT,
     ],
 )
@@ -261,9 +262,13 @@ def test_field_of_view_is_that_of_the_detection_model(detection: dict[str, objec
 
 def test_check_run_and_dry_run_warn_without_failing(tmp_path: Path) -> None:
     file, spec = tmp_path / "scene.yaml", tmp_path / "spec.toml"
-    file.write_text(changed(("num_steps: 20", "num_steps: 8"), ("to_step: 20", "to_step: 8"), ("18", "8")))
-    spec.write_text('name = "small"\nscenarios = ["scene.yaml"]\nplanners = ["still", "random"]\nruns = 1\n')
-    for words in (["check", str(file)], ["run", str(file), "--planner", "still"], ["campaign", str(spec), "--dry-run"]):
+    file.write_text(changed(("num_steps: 20", "num_steps: 8"), ("last_scan: 20", "last_scan: 8"), ("18", "8")))
+    spec.write_text('name = "small"\nscenarios = ["scene.yaml"]\nplanners = ["stationary", "random"]\nruns = 1\n')
+    for words in (
+        ["check", str(file)],
+        ["run", str(file), "--planner", "stationary"],
+        ["campaign", str(spec), "--dry-run"],
+    ):
         result = CliRunner().invoke(app, words)
         assert result.exit_code == 0, result.output
         assert result.stderr.count("warning: births up to step 5 without feedback") == 1, words
@@ -277,8 +282,8 @@ CAPPED = "at most 3 labels are kept, and {} targets are there at once: the other
 @pytest.mark.parametrize(
     ("targets", "number"),
     [
-        ("{kind: crowd, number: 3, std: [1.0, 1.0]}", None),
-        ("{kind: crowd, number: 4, std: [1.0, 1.0]}", 4),
+        ("{kind: uniform, number: 3, std: [1.0, 1.0]}", None),
+        ("{kind: uniform, number: 4, std: [1.0, 1.0]}", 4),
         ("{kind: poisson, expected: 0.5, mean: [0, 0, 0, 0], std: [1, 1, 1, 1], death_probability: 0.1}", 4),
         ("{kind: poisson, expected: 0.5, mean: [0, 0, 0, 0], std: [1, 1, 1, 1]}", None),
     ],

@@ -112,8 +112,8 @@ def test_damaged_explanations_are_named() -> None:
 def test_a_scenario_says_whether_decisions_are_explained() -> None:
     fields = {
         "time.num_steps": 4,
-        "ospa.from_step": 1,
-        "ospa.to_step": 4,
+        "ospa.first_scan": 1,
+        "ospa.last_scan": 4,
         "control.decision_steps": [2, 3],
         "control.num_samples": 4,
     }

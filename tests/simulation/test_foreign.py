@@ -299,7 +299,7 @@ def test_plots_are_tracked(tmp_path: Path) -> None:
             content += plot(40000.0 + time + turned, float(np.hypot(*offset)) / 1852.0, azimuth)
     (tmp_path / "radar.ast").write_bytes(content)
     (tmp_path / "radar.yaml").write_text(
-        "origin: {lon: -1.1171, lat: 50.7865}\nrecording: {gather: 3.5}\n"
+        "origin: {lon: -1.1171, lat: 50.7865}\nrecording: {scan_window: 3.5}\n"
         'sensors:\n  - {name: "1/2", position: [0, 0], detection: {kind: constant, probability: 0.95}, '
         "noise: {kind: range_dependent, sigma_range: 20.0, eta_range: 0.0, sigma_bearing_deg: 0.5, eta_bearing: 0.0}, "
         "clutter: {kind: region, rate: 0.5}}\n",
@@ -308,7 +308,7 @@ def test_plots_are_tracked(tmp_path: Path) -> None:
     made = scenario_from_recording(tmp_path / "radar.yaml", tmp_path / "radar.ast")
     assert made.assumed["turn"].startswith("1/2 once in 4 s, clockwise")
     assert [len(scan) for scans in made.recording.scans for scan in scans if scan is not None][1:-1] == [3] * 24
-    last = run_scenario(made.scenario, "still", seed=0).estimates[-2]
+    last = run_scenario(made.scenario, "stationary", seed=0).estimates[-2]
     truth = SHIPS[:, :2] + SHIPS[:, 2:] * 98.0
     assert last.num_targets == 3
     assert max(min(np.hypot(*(mean[:2] - ship)) for ship in truth) for mean in last.means) < 60.0

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from vedette.control import FixedPlanner
+from vedette.control import ConstantPlanner
 from vedette.errors import NumericalError
 from vedette.evaluation.diagnostics import Diagnostic, diagnostics_line, run_diagnostics
 from vedette.evaluation.health import health_sums, summarise_health
@@ -289,8 +289,8 @@ def test_an_estimate_that_cannot_be_scored_leaves_all_scans(experiment: Experime
 
 def test_an_interrupt_keeps_what_was_before(experiment: Experiment) -> None:
     with pytest.raises(RunInterrupted, match=r"step 6 of 8 \(6 s\), in the filter of sensor 2: interrupted") as caught:
-        run(failing(experiment, KeyboardInterrupt(), 6), FixedPlanner((Actions.of(heading_deg=0.0),) * 2))
+        run(failing(experiment, KeyboardInterrupt(), 6), ConstantPlanner((Actions.of(heading_deg=0.0),) * 2))
     assert isinstance(caught.value, KeyboardInterrupt)
     assert caught.value.record is not None
-    assert_first_scans(caught.value.record, run(experiment, FixedPlanner((Actions.of(heading_deg=0.0),) * 2)), 5)
+    assert_first_scans(caught.value.record, run(experiment, ConstantPlanner((Actions.of(heading_deg=0.0),) * 2)), 5)
     assert len(caught.value.record.decisions) == 1

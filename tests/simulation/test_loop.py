@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from vedette.control import FixedPlanner, RandomPlanner
+from vedette.control import ConstantPlanner, RandomPlanner
 from vedette.errors import InputError
 from vedette.platforms import Actions
 from vedette.scenarios import load_scenario
@@ -34,13 +34,13 @@ def run(experiment, planner, **overrides):
 def test_without_a_planner_sensors_never_move(shortened):
     record = run(shortened, None)
     np.testing.assert_array_equal(record.poses, np.broadcast_to(shortened.poses, record.poses.shape))
-    assert record.planner == "still"
+    assert record.planner == "stationary"
     assert record.decisions == ()
     assert len(record.estimates) == record.num_scans == 14
 
 
 def test_sensors_lie_still_until_the_first_decision_and_then_keep_its_course(shortened):
-    record = run(shortened, FixedPlanner((Actions.of(heading_deg=-30.0), Actions.of(heading_deg=45.0))))
+    record = run(shortened, ConstantPlanner((Actions.of(heading_deg=-30.0), Actions.of(heading_deg=45.0))))
     (decision,) = record.decisions
     assert (decision.step, decision.time) == (10, 10.0)
     np.testing.assert_array_equal(record.poses[9], shortened.poses)
@@ -54,7 +54,7 @@ def test_sensors_lie_still_until_the_first_decision_and_then_keep_its_course(sho
 
 def test_a_sensor_may_be_under_way_from_the_start(shortened):
     record = run(
-        replace(shortened, first_actions=(np.zeros(1), None)), FixedPlanner((Actions.of(heading_deg=0.0),) * 2)
+        replace(shortened, first_actions=(np.zeros(1), None)), ConstantPlanner((Actions.of(heading_deg=0.0),) * 2)
     )
     assert record.poses[1, 0, 0] == pytest.approx(shortened.poses[0, 0] + shortened.platforms[0].speed)
     np.testing.assert_array_equal(record.poses[1, 1], shortened.poses[1])
@@ -89,7 +89,7 @@ def test_feedback_gives_every_sensor_the_fused_belief(shortened):
 def test_unequal_scan_times_move_sensors_by_the_time_between(shortened):
     times = np.array([1.0, 2.0, 4.0, 4.5])
     uneven = replace(shortened, times=times, decision_steps=(1,))
-    record = run(uneven, FixedPlanner((Actions.of(heading_deg=0.0),) * 2))
+    record = run(uneven, ConstantPlanner((Actions.of(heading_deg=0.0),) * 2))
     np.testing.assert_allclose(np.diff(record.poses[:, 0, 0]), np.diff(times) * uneven.platforms[0].speed)
 
 

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from control.examples import mobile_sensor
-from vedette.control import FixedPlanner, Plan, PlanningSettings, StayInside
+from vedette.control import ConstantPlanner, Plan, PlanningSettings, StayInside
 from vedette.control.baselines import ConstraintReportingPlanner
 from vedette.densities import LMB
 from vedette.errors import InputError
@@ -27,7 +27,7 @@ TIMES = np.array([1.0, 2.0, 4.0, 5.0, 7.0, 8.0])
 POSES = np.array([[-500.0, 300.0, 0.2], [-450.0, -350.0, -0.4]])
 STARTS = np.array([[-60.0, 250.0, 8.0, -3.0], [180.0, -120.0, -4.0, 9.0], [-220.0, -300.0, 0.0, 5.0]])
 COVS = [np.diag([400.0, 900.0, 25.0, 9.0]) * (1.0 + 0.3 * i) for i in range(3)]
-SHORT = {"time.num_steps": 12, "control.decision_steps": [10], "ospa.to_step": 12}
+SHORT = {"time.num_steps": 12, "control.decision_steps": [10], "ospa.last_scan": 12}
 SENSORS = (mobile_sensor("lmb", HeadingPlatform(30.0, HEADINGS)), mobile_sensor("lmb", HeadingPlatform(45.0, HEADINGS)))
 
 
@@ -216,7 +216,7 @@ def test_custom_planners_may_require_the_truth() -> None:
     class Told:
         """A planner that keeps what it was told."""
 
-        name = "told"
+        name = "true_targets"
         truth: Truth | None = None
 
         def with_truth(self, truth: Truth) -> Told:
@@ -224,7 +224,7 @@ def test_custom_planners_may_require_the_truth() -> None:
             return self
 
         def plan(self, state: State, poses: Any, *, rng: np.random.Generator) -> Plan:
-            return FixedPlanner((Actions.of(heading_deg=0.0),) * 2).plan(state, poses, rng=rng)
+            return ConstantPlanner((Actions.of(heading_deg=0.0),) * 2).plan(state, poses, rng=rng)
 
     scenario, plain, inside = replace_fields(load_scenario("paper-a"), SHORT), Told(), Told()
     sensors = build_sensors(scenario)

@@ -26,9 +26,9 @@ CAMERA = """\
       half_width_deg: 70
       pointings_deg: [-120, -60]
       turn_rate_deg: 10
-      carrier: {kind: courses, speeds: [1.0, 2.0], headings_deg: [180.0]}
+      platform: {kind: heading, speeds: [1.0, 2.0], headings_deg: [180.0]}
     detection: {kind: camera, probability: 0.9, max_range: 200}
-    moves_from: start
+    stationary_until_first_decision: false
 """
 
 
@@ -36,7 +36,7 @@ CAMERA = """\
 def scenario() -> Scenario:
     text = changed(
         ("  - {name: north, position: [0.0, 40.0], heading_deg: 4.0}\n", f"  - position: [0.0, 40.0]\n{CAMERA}"),
-        ("position: [0.0, -40.0]", "position: [0.0, -40.0], platform: {kind: steps, length: 6.0, speed: 3.0}"),
+        ("position: [0.0, -40.0]", "position: [0.0, -40.0], platform: {kind: grid_moves, length: 6.0, speed: 3.0}"),
         ("{decision_steps: [4, 8]}", "{decision_steps: [4, 8], num_samples: 2, horizon_steps: 2}"),
     )
     return Scenario(parse_scenario(text))
@@ -44,7 +44,7 @@ def scenario() -> Scenario:
 
 @pytest.fixture(scope="module")
 def records(scenario: Scenario) -> dict[str, RunRecord]:
-    return {name: run_scenario(scenario, name, seed=2, num_threads=1) for name in ("jdm", "idm", "fixed")}
+    return {name: run_scenario(scenario, name, seed=2, num_threads=1) for name in ("jdm", "idm", "constant")}
 
 
 def test_poses_are_those_of_the_platforms(records: dict[str, RunRecord]) -> None:
@@ -64,7 +64,7 @@ def test_poses_are_those_of_the_platforms(records: dict[str, RunRecord]) -> None
 
 
 def test_without_a_decision_a_platform_keeps_to_its_course(records: dict[str, RunRecord]) -> None:
-    (row, *_) = decided_actions(records["fixed"])
+    (row, *_) = decided_actions(records["constant"])
     assert describe_choice(row) == "heading 0°, speed 1, pointing -90°; dx 0, dy 0"
 
 

@@ -39,6 +39,6 @@ def test_the_scans_drawn_again_are_those_that_the_loop_simulated(monkeypatch: py
 
 def test_a_record_of_other_sensors_is_refused() -> None:
     scenario = load_scenario("paper-a")
-    record = run_scenario(scenario, "still", seed=0)
+    record = run_scenario(scenario, "stationary", seed=0)
     with pytest.raises(InputError, match="expected 2 sensors; got 1"):
         scans_of(replace(record, poses=record.poses[:, :1]), build_experiment(scenario))

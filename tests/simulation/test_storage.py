@@ -49,7 +49,7 @@ def saved(tmp_path: Path) -> Path:
     return save_run(make_record(), tmp_path / "run", scenario_text="name: synthetic\n")
 
 
-@pytest.mark.parametrize("planner", ["jdm", "idm", "random", "fixed"])
+@pytest.mark.parametrize("planner", ["jdm", "idm", "random", "constant"])
 def test_a_run_reads_back_bit_for_bit(tmp_path: Path, planner: str) -> None:
     record = make_record(planner)
     assert_same(load_run(save_run(record, tmp_path / "deep" / "run")), record)
@@ -83,7 +83,7 @@ def test_tables_with_gaps_read_back(tmp_path: Path) -> None:
 
 
 def test_runs_without_any_target_estimate_or_scan_read_back(tmp_path: Path) -> None:
-    record = make_record("fixed")
+    record = make_record("constant")
     nothing = Estimate(np.empty((0, 2), np.int64), np.empty((0, 4)), np.empty((0, 4, 4)), np.empty(0))
     truth = replace(record.truth, offsets=np.zeros(41, np.int64), ids=np.empty(0, np.int64), states=np.empty((0, 4)))
     record = replace(record, estimates=(nothing,) * 40, truth=truth)

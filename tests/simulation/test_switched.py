@@ -13,7 +13,7 @@ from typer.testing import CliRunner
 from scenarios.minimal import changed
 from simulation.test_storage import assert_same
 from vedette.cli import app
-from vedette.control import FixedPlanner
+from vedette.control import ConstantPlanner
 from vedette.errors import InputError
 from vedette.evaluation.actions import describe_choice
 from vedette.evaluation.ensembles import rounded_choice
@@ -28,7 +28,7 @@ from vedette.simulation.storage import load_run, save_run
 from vedette.simulation.tables import check_record, tables_of
 
 NOISE = "  noise: {kind: constant, std: [0.02, 3.0]}"
-COURSES = f"{NOISE}\n  platform: {{kind: courses, speed: 2.0, headings_deg: [0, 90]}}"
+COURSES = f"{NOISE}\n  platform: {{kind: heading, speed: 2.0, headings_deg: [0, 90]}}"
 PLANS = ("control: {decision_steps: [4, 8]}", "control: {decision_steps: [4, 8], num_samples: 2, horizon_steps: 2}")
 
 
@@ -44,7 +44,7 @@ def fixed(scenario: Scenario, *actions: Actions, **changes: Any) -> RunRecord:
         return np.zeros((truth.num_scans, 3))
 
     experiment = replace(build_experiment(scenario), **changes)
-    return simulate(experiment, FixedPlanner(actions), seed=3, run=0, score=no_score)
+    return simulate(experiment, ConstantPlanner(actions), seed=3, run=0, score=no_score)
 
 
 @pytest.fixture(scope="module")
@@ -57,7 +57,7 @@ def test_who_is_off_is_who_has_no_scans_bit_for_bit(record: RunRecord) -> None:
     scans_at = np.ones((2, 20), bool)
     scans_at[0, 4:] = False
     headings = [Actions.of(heading_deg=angle) for angle in (0.0, 90.0)]
-    other = fixed(scene("moves_from: first_decision"), *headings, scans_at=scans_at)
+    other = fixed(scene("stationary_until_first_decision: true"), *headings, scans_at=scans_at)
     np.testing.assert_array_equal(record.off, ~scans_at.T)
     assert not other.off.any()
     for name in ("times", "truth", "poses", "estimates", "health"):
@@ -85,7 +85,7 @@ def test_who_was_off_is_kept(record: RunRecord, tmp_path: Path) -> None:
             check_record(replace(record, off=wrong))
 
 
-@pytest.mark.parametrize("planner", ["jdm", "idm", "lookahead", "told"])
+@pytest.mark.parametrize("planner", ["jdm", "idm", "lookahead", "true_targets"])
 def test_every_planner_switches_off_what_costs_too_much(planner: str) -> None:
     found = run_scenario(scene("switchable: true\n  price: 1.0e+9"), planner, seed=1)
     assert not found.off[:4].any()
@@ -101,7 +101,7 @@ MOST_ONE = (PLANS[0], PLANS[1][:-1] + ", constraints: [{kind: max_active, sensor
 
 
 @pytest.mark.parametrize(
-    "planner", ["jdm", "idm", "lookahead", "told", "oracle", "random", "nearest", "assigned", "centroid"]
+    "planner", ["jdm", "idm", "lookahead", "true_targets", "oracle", "random", "nearest", "assigned_target", "centroid"]
 )
 def test_every_planner_keeps_to_the_number_of_sensors_that_may_scan(planner: str) -> None:
     scenario = Scenario(parse_scenario(changed((NOISE, f"{COURSES}\n  switchable: true"), MOST_ONE)))
@@ -128,13 +128,15 @@ def test_a_number_that_cannot_be_kept_to_is_refused(keys: str, number: int, faul
 
 @pytest.mark.parametrize("compass", ["", "\n  compass: true"])
 def test_a_sensor_that_moves_from_the_start_is_on_until_its_first_decision(compass: str) -> None:
-    found = run_scenario(scene(f"switchable: true\n  moves_from: start\n  price: 1.0e+9{compass}"), "jdm", seed=1)
+    found = run_scenario(
+        scene(f"switchable: true\n  stationary_until_first_decision: false\n  price: 1.0e+9{compass}"), "jdm", seed=1
+    )
     assert not found.off[:4].any()
     assert found.off[4:].all()
     assert found.decisions[0].plan.actions[0].columns[-1] == "on"
 
 
-@pytest.mark.parametrize("rule", ["nearest", "assigned", "centroid", "fixed"])
+@pytest.mark.parametrize("rule", ["nearest", "assigned_target", "centroid", "constant"])
 def test_rules_of_thumb_leave_sensors_on(rule: str) -> None:
     assert not run_scenario(scene("switchable: true\n  price: 1.0e+9"), rule, seed=1).off.any()
 

@@ -85,7 +85,10 @@ def test_what_filters_take_off_is_no_bias_any_more():
     said: dict[str, Any] = {"sensors.0.bias.range": 20.0, "sensors.0.bias.clock": 0.5}
     said["sensors.1.bias.bearing_deg"] = 1.0
     assert build_experiment(replace_fields(scenario, said)).true_sensors == ()
-    true = {"sensors.0.truth": {"bias": {"range": 50.0}}, "sensors.1.truth": {"bias": {"bearing_deg": 3.0}}}
+    true = {
+        "sensors.0.true_parameters": {"bias": {"range": 50.0}},
+        "sensors.1.true_parameters": {"bias": {"bearing_deg": 3.0}},
+    }
     first, second = build_experiment(replace_fields(scenario, said | true)).true_sensors
     assert first.bias == models.Bias(range=30.0, clock=-0.5)
     assert second.bias.bearing == pytest.approx(np.radians(2.0))

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from control.examples import mobile_sensor
-from vedette.control import FixedPlanner, Plan
+from vedette.control import ConstantPlanner, Plan
 from vedette.densities import GLMB, LMB, FactoredGLMB, LabelledDensity, Poisson, UndetectedIntensity, as_glmb
 from vedette.errors import InputError
 from vedette.evaluation import run_scenario
@@ -38,7 +38,7 @@ class Keeps:
 
     def plan(self, state: State, poses: Any, *, rng: np.random.Generator) -> Plan:
         self.state = state
-        return FixedPlanner((Actions.of(heading_deg=0.0),) * 2).plan(state, poses, rng=rng)
+        return ConstantPlanner((Actions.of(heading_deg=0.0),) * 2).plan(state, poses, rng=rng)
 
 
 def truth() -> Truth:
@@ -74,7 +74,7 @@ def told_of(kind: str, births: bool) -> State:
     inner = Keeps()
     planner = TrueTargetsPlanner(inner, sensors(kind, births)).with_truth(truth())
     plan = planner.plan(state, POSES, rng=np.random.default_rng(0))
-    assert plan.planner == "told"
+    assert plan.planner == "true_targets"
     found: State = inner.state
     return found
 
@@ -120,16 +120,19 @@ def test_where_nothing_is_in_sight_it_goes_to_the_targets() -> None:
     """The oracle of one decision stays before the gap; `jdm` does not know in time where the targets are."""
     short = {"time.num_steps": 20, "control.decision_steps": list(range(1, 20))}
     gap, errors = replace_fields(load_scenario("beyond-the-gap"), short), {}
-    for name in ("told", "jdm", "oracle"):
+    for name in ("true_targets", "jdm", "oracle"):
         errors[name] = run_scenario(gap, name, seed=0, run=3).ospa[5:, 0].mean()
-    assert errors["told"] < min(errors["jdm"], errors["oracle"]) - 1.0
+    assert errors["true_targets"] < min(errors["jdm"], errors["oracle"]) - 1.0
 
 
 def test_a_named_planner_takes_its_own_reward_and_does_not_search() -> None:
-    named = {"planners": {"floor": {"kind": "told", "reward": {"kind": "peecs"}}}, "control.association": "known"}
+    named = {
+        "planners": {"floor": {"kind": "true_targets", "reward": {"kind": "peecs"}}},
+        "control.association": "known",
+    }
     scenario = replace_fields(load_scenario("paper-a"), named)
     built: Any = build_planner(scenario, "floor")
     assert built.name == "floor"
     assert type(built.planner.planner.reward).__name__ == "PeecsReward"
-    assert built.planner.planner.settings.undetected_worth == 0.0
-    assert isinstance(build_planner(scenario, "told"), TrueTargetsPlanner)
+    assert built.planner.planner.settings.undetected_target_value == 0.0
+    assert isinstance(build_planner(scenario, "true_targets"), TrueTargetsPlanner)

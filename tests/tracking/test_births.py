@@ -231,7 +231,7 @@ def test_without_feedback_a_sensor_counts_by_its_view_even_without_a_scan() -> N
     local, thirds, poses = filters(targets(), (*SENSORS, SENSORS[0])), (1 / 3, 1 / 3, 1 / 3), np.zeros((3, 3))
     mean, cov = [[0.0, 0.0, 1.0, 1.0]], [np.diag([9.0, 9.0, 4.0, 4.0])]
     beliefs = tuple(lmb([[1, 0]], [r], mean, cov) for r in (0.9, 0.5, 0.3))
-    tracker = Distributed(local, Clmb(thirds, by_views=True))
+    tracker = Distributed(local, Clmb(thirds, field_of_view_weighting=True))
     state, _ = tracker.step(State(beliefs, beliefs[0], 4, 4.0), [None] * 3, poses, 5.0, rngs=rngs(3))
     predicted = [own.predict(belief, 1.0, 5)[0] for own, belief in zip(local, beliefs, strict=True)]
     detected = np.array([0.9, 0.8, 0.9])

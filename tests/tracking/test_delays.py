@@ -28,7 +28,7 @@ from vedette.tracking import (
     save_snapshot,
 )
 
-LATE = {"share": 0.6, "up_to": 3.0, "start": 4.0, "end": 8.0, "window": None}
+LATE = {"probability": 0.6, "max_delay": 3.0, "start": 4.0, "end": 8.0, "window": None}
 STEPS = 12
 
 
@@ -105,7 +105,7 @@ def test_a_scenario_has_it_and_a_run_is_the_same_again() -> None:
     first, again = (run_scenario(scenario, "jdm", seed=3, num_threads=threads) for threads in (1, 2))
     np.testing.assert_array_equal(first.ospa, again.ospa)
     assert first.decisions[0].plan.chosen == again.decisions[0].plan.chosen
-    assert not np.array_equal(first.ospa, run_scenario(scene(share=0.0), "jdm", seed=3).ospa)
+    assert not np.array_equal(first.ospa, run_scenario(scene(probability=0.0), "jdm", seed=3).ospa)
 
 
 def test_a_loop_with_pending_scans_can_be_saved(tmp_path: Path) -> None:
@@ -125,8 +125,8 @@ def test_a_loop_with_pending_scans_can_be_saved(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("late", "message"),
     [
-        ({"share": 1.5}, r"sensors\[1\].scans.late.share: expected a number of at most 1, got 1.5"),
-        ({"up_to": 0.0}, r"sensors\[1\].scans.late.up_to: expected a number above 0, got 0.0"),
+        ({"probability": 1.5}, r"sensors\[1\].scans.late.probability: expected a number of at most 1, got 1.5"),
+        ({"max_delay": 0.0}, r"sensors\[1\].scans.late.max_delay: expected a number above 0, got 0.0"),
         ({"end": 3.0}, r"sensors\[1\].scans.late.end: expected a time from start on, 4 s, got 3.0"),
         ({"window": -1.0}, r"sensors\[1\].scans.late.window: expected a number of at least 0, got -1.0"),
     ],

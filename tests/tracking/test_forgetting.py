@@ -54,7 +54,7 @@ def mean_labels(states: list[State]) -> float:
 
 @pytest.mark.parametrize("kind", [LmbFilter, FactoredGlmbFilter])
 def test_local_tracks_do_not_accumulate(kind: Any) -> None:
-    fusion = LabelMatchedFusion(Clmb((0.5, 0.5), by_views=True))
+    fusion = LabelMatchedFusion(Clmb((0.5, 0.5), field_of_view_weighting=True))
     filters = tuple(kind(WORLD, SENSOR) for _ in range(2))
     states, infos = follow(Distributed(filters, fusion), 150, passing)
     piled, others = follow(Distributed(filters, fusion, min_detection=0.0), 150, passing)
@@ -68,7 +68,7 @@ def test_local_tracks_do_not_accumulate(kind: Any) -> None:
 
 @pytest.mark.parametrize("away", [5, 15])
 def test_a_target_that_is_out_of_view_for_a_while_keeps_its_label(away: int) -> None:
-    fusion = LabelMatchedFusion(Clmb((0.5, 0.5), by_views=True))
+    fusion = LabelMatchedFusion(Clmb((0.5, 0.5), field_of_view_weighting=True))
     tracker = Distributed((LmbFilter(WORLD, SENSOR), LmbFilter(WORLD, SENSOR)), fusion)
 
     rng, state, sure = np.random.default_rng(2), tracker.initial(), []

@@ -20,7 +20,7 @@ from vedette.tracking.base import belief_bytes
 from vedette.tracking.network import NEVER, belief_parts, hop_counts, message_bytes, metropolis_weights
 
 EQUAL = (1 / 3, 1 / 3, 1 / 3)
-MERGING = Clmb(EQUAL, by_views=True)
+MERGING = Clmb(EQUAL, field_of_view_weighting=True)
 WORLD = targets()
 SENSORS = tuple(sensor(std, prob, 0.5) for std, prob in ((5.0, 0.8), (8.0, 0.7), (4.0, 0.6)))
 LINE = np.array([[0.0, 50.0, 0.0], [100.0, 50.0, 0.0], [200.0, 50.0, 0.0]])  # 100 m from each to the next
@@ -52,7 +52,7 @@ def belief_network(fusion: Any, network: Network) -> BeliefNetwork:
 
 
 def test_hop_counts_and_arrivals() -> None:
-    network, rng = Network(radio_range=120.0, hops=1, delay=2), np.random.default_rng(0)
+    network, rng = Network(radio_range=120.0, max_hops=1, delay=2), np.random.default_rng(0)
     links = network.links(LINE, rng)
     np.testing.assert_array_equal(links, [[0, 1, 0], [1, 0, 1], [0, 1, 0]])
     np.testing.assert_array_equal(hop_counts(links), [[0, 1, 2], [1, 0, 1], [2, 1, 0]])
@@ -64,13 +64,13 @@ def test_hop_counts_and_arrivals() -> None:
     # Of one message each of 10, 20 and 30 bytes: with one hop each is sent by its source alone, with two by the middle
     # as well, and without any link by nobody.
     assert network.bytes_sent(hop_counts(links), [10, 20, 30]) == (10, 20, 30)
-    assert Network(120.0, hops=2).bytes_sent(hop_counts(links), [10, 20, 30]) == (30, 60, 50)
+    assert Network(120.0, max_hops=2).bytes_sent(hop_counts(links), [10, 20, 30]) == (30, 60, 50)
     assert Network(90.0).bytes_sent(hop_counts(apart), [10, 20, 30]) == (0, 0, 0)
     assert Network(120.0, consensus_rounds=4).bytes_sent(hop_counts(links), [10, 20, 30]) == (120, 120, 120)
 
 
 def test_links_fail_with_the_given_probability() -> None:
-    network, rng = Network(loss=0.3), np.random.default_rng(3)
+    network, rng = Network(link_loss_probability=0.3), np.random.default_rng(3)
     drawn = np.array([network.links(LINE, rng) for _ in range(4000)])
     assert (drawn == drawn.swapaxes(1, 2)).all()
     share = drawn[:, *np.triu_indices(3, 1)].mean()
@@ -86,7 +86,7 @@ def test_metropolis_weights_keep_the_mean() -> None:
     np.testing.assert_allclose(limit[:3, :3], 1 / 3, atol=1e-12)
 
 
-@pytest.mark.parametrize("network", [Network(), Network(120.0), Network(hops=2)])
+@pytest.mark.parametrize("network", [Network(), Network(120.0), Network(max_hops=2)])
 @pytest.mark.parametrize("kind", [SequentialLmbFilter, MultiSensorGlmbFilter])
 def test_a_fully_connected_network_equals_the_central_filter(kind: Any, network: Network) -> None:
     central = follow(Central(kind(WORLD, SENSORS)))
@@ -226,9 +226,9 @@ def test_the_information_of_a_scan_can_be_added_to_another_prediction() -> None:
 def test_bad_networks() -> None:
     for fields, name in (
         ({"radio_range": 0.0}, "radio_range"),
-        ({"hops": 0}, "hops"),
-        ({"loss": 1.0}, "loss"),
-        ({"loss": -0.1}, "loss"),
+        ({"max_hops": 0}, "max_hops"),
+        ({"link_loss_probability": 1.0}, "link_loss_probability"),
+        ({"link_loss_probability": -0.1}, "link_loss_probability"),
         ({"delay": 1.5}, "delay"),
         ({"delay": -1}, "delay"),
         ({"consensus_rounds": 0}, "consensus_rounds"),
@@ -248,7 +248,9 @@ def test_late_scans_use_the_pose_at_their_own_time() -> None:
     """Sensor 2 saw the target before it went away; sensor 1 sees nothing there."""
     near = tuple(sensor(3.0, 0.95, 0.1, max_range=100.0) for _ in range(2))
     world = targets(existence=(0.5,))
-    tracker = BeliefNetwork(filters(world, near), Clmb((0.5, 0.5), by_views=True), Network(delay=1), MERGING)
+    tracker = BeliefNetwork(
+        filters(world, near), Clmb((0.5, 0.5), field_of_view_weighting=True), Network(delay=1), MERGING
+    )
     state = tracker.initial()
     far, close = [1000.0, 0.0, 0.0], [0.0, 50.0, 0.0]
     for time, second in ((1.0, close), (2.0, far)):
@@ -257,7 +259,9 @@ def test_late_scans_use_the_pose_at_their_own_time() -> None:
     assert state.local[0].existence[0] > 0.9
 
 
-@pytest.mark.parametrize("network", [Network(350.0, hops=1), Network(350.0, delay=1), Network(350.0, loss=0.3)])
+@pytest.mark.parametrize(
+    "network", [Network(350.0, max_hops=1), Network(350.0, delay=1), Network(350.0, link_loss_probability=0.3)]
+)
 @pytest.mark.parametrize("rule", [Clmb(EQUAL), ArithmeticAverage(EQUAL)])
 def test_labels_that_sensors_make_themselves_are_matched_in_a_network(rule: Any, network: Network) -> None:
     world = targets(existence=(), measured=MeasurementBirth(0.5, 0.1, np.array([10.0, 10.0, 5.0, 5.0])))

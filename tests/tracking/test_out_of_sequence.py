@@ -33,7 +33,7 @@ MEASURED = {
     "birth.from_measurements": {"expected": 0.5, "max_existence": 0.03, "std": [30.0, 30.0, 9.0, 9.0]},
 }
 LMBS: dict[str, Any] = {"fusion": {"kind": "sequential"}, "filter": {"kind": "lmb"}}
-RADIO = {"network": {"delay": 1, "loss": 0.2}}
+RADIO = {"network": {"delay": 1, "link_loss_probability": 0.2}}
 # Of each family of trackers, filters and fusions one, and all that draw or remember.
 TRACKERS: dict[str, dict[str, Any]] = {
     "paper-e": {},
@@ -52,7 +52,7 @@ TRACKERS: dict[str, dict[str, Any]] = {
     },
     "matched": {**MEASURED, "fusion": {"kind": "clmb", "matching": "assignment"}, "filter": {"kind": "lmb"}},
     "radio": {**RADIO, **MEASURED, **LMBS},
-    "reach": {**MEASURED, **LMBS, "network": {"hops": 1, "loss": 0.3}},
+    "reach": {**MEASURED, **LMBS, "network": {"max_hops": 1, "link_loss_probability": 0.3}},
     "radio beliefs": {**RADIO, "fusion": {"kind": "clmb", "feedback": True}, "filter": {"kind": "lmb"}},
     "consensus": {"fusion": {"kind": "parallel"}, "network": {"consensus_rounds": 2}, "filter": {"kind": "lmb"}},
 }

@@ -136,7 +136,7 @@ def test_delayed_beliefs_count_each_scan_once(network: Network) -> None:
             np.testing.assert_allclose(one.existence, other.existence, atol=0.02)
 
 
-@pytest.mark.parametrize("network", [Network(), Network(120.0, hops=1), Network(loss=0.3)])
+@pytest.mark.parametrize("network", [Network(), Network(120.0, max_hops=1), Network(link_loss_probability=0.3)])
 @pytest.mark.parametrize("beliefs", [False, True])
 def test_zero_time_in_a_network_has_no_motion_deaths_or_births(network: Network, beliefs: bool) -> None:
     world = targets((0.5, 0.3))

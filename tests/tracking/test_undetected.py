@@ -41,7 +41,7 @@ TRACKERS: dict[str, Tracker] = {
 
 
 def undetected(**changes: Any) -> models.UndetectedModel:
-    own: dict[str, Any] = {"birth_rate": 0.05, "enters": "border", "speed": 6.0, **changes}
+    own: dict[str, Any] = {"birth_rate": 0.05, "birth_density": "boundary", "speed": 6.0, **changes}
     return models.UndetectedModel(GRID, own.pop("expected", 3.0), **own)
 
 

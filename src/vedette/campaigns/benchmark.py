@@ -149,7 +149,7 @@ def campaign_of(scene: Scene, entrant: Entrant | None, runs: int, seed: int, fol
             {"name": name, "set": {"fusion": {"kind": "central", "filter": filters[name]}} if filters[name] else {}}
             for name in names
         ]
-        spec = CampaignSpec(**given, planners=("still",), variants=variants, compare="variant")  # type: ignore[arg-type]
+        spec = CampaignSpec(**given, planners=("stationary",), variants=variants, compare="variant")  # type: ignore[arg-type]
     return resolve(spec, **how)
 
 

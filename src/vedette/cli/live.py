@@ -55,7 +55,7 @@ def live(
         typer.Option(
             "--planner",
             metavar="NAME",
-            help='Planner, as in `vedette run`; "still": no decisions.',
+            help='Planner, as in `vedette run`; "stationary": no decisions.',
             autocompletion=strategies,
         ),
     ] = "jdm",

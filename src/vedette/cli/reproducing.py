@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 
 PUBLISHED_PAGE = "yardstick.md"
 _RUNS = 30
-_STRATEGIES = ("jdm", "idm", "assigned", "random")
+_STRATEGIES = ("jdm", "idm", "assigned_target", "random")
 _FOLDER = "reproduction"
 
 
@@ -45,7 +45,8 @@ def reproduce(
         typer.Option(
             "--planners",
             metavar="LIST",
-            help="Strategies to compare, the first is the reference; else the yardstick's, or jdm,idm,assigned,random.",
+            help="Strategies to compare, the first is the reference; else the yardstick's, or "
+            "jdm,idm,assigned_target,random.",
             autocompletion=lists_of_strategies,
         ),
     ] = None,

@@ -92,9 +92,9 @@ def run(
         str,
         typer.Option(
             "--planner",
-            help="jdm (joint), idm (independent), lookahead (joint, several decisions), nearest, assigned, centroid "
-            "(rules of thumb), oracle and told (know the targets), random, fixed (first course), still, or the "
-            "scenario's own.",
+            help="jdm (joint), idm (independent), lookahead (joint, several decisions), nearest, assigned_target, "
+            "centroid (rules of thumb), oracle and true_targets (know the targets), random, constant (first course), "
+            "stationary, or the scenario's own.",
             autocompletion=strategies,
         ),
     ] = "jdm",

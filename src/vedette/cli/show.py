@@ -98,10 +98,10 @@ def _sensors(scenario: Scenario) -> Table:
     from rich.text import Text
 
     from vedette.scenarios.sections.courses import start_course
-    from vedette.scenarios.summary import moves_from
+    from vedette.scenarios.summary import first_motion
 
     model = scenario.model
-    start_column = [] if moves_from(model) else ["moves from"]
+    start_column = [] if first_motion(model) else ["moves from"]
     direction = "course\n(deg)" if model.by_compass else "heading\n(deg)"
     table = _numbers_table("sensors", "name", "x\n(m)", "y\n(m)", direction, "platform", *start_column)
     rows: list[tuple[str | Text, ...]] = []
@@ -110,7 +110,8 @@ def _sensors(scenario: Scenario) -> Table:
         if model.by_compass:
             heading = start_course(heading, model.north(), sensor.position)
         place = (f"{sensor.position[0]:g}", f"{sensor.position[1]:g}")
-        start = "-" if sensor.platform.kind == "still" else sensor.moves_from.replace("_", " ")
+        start = "first decision" if sensor.stationary_until_first_decision else "start"
+        start = "-" if sensor.platform.kind == "stationary" else start
         rows.append((Text(name), *place, f"{heading:g}", sensor.platform.kind, *[start for _ in start_column]))
     return _with_rows(table, rows)
 

@@ -1,6 +1,6 @@
 """Sensor control: ideal measurements, rewards, searches over joint actions, constraints and planners."""
 
-from vedette.control.baselines import ConstraintReportingPlanner, FixedPlanner, Planner, RandomPlanner, RequiresTruth
+from vedette.control.baselines import ConstantPlanner, ConstraintReportingPlanner, Planner, RandomPlanner, RequiresTruth
 from vedette.control.constraints import (
     ActivationConstraint,
     Constraint,
@@ -59,6 +59,7 @@ __all__ = [
     "Bound",
     "CardinalityVarianceReward",
     "CauchySchwarzReward",
+    "ConstantPlanner",
     "Constraint",
     "ConstraintContext",
     "ConstraintReportingPlanner",
@@ -70,7 +71,6 @@ __all__ = [
     "ExpectedGospaReward",
     "ExpectedLossReward",
     "Explanation",
-    "FixedPlanner",
     "HasMissedCost",
     "HasUnitVolume",
     "HorizonPlanner",

@@ -81,7 +81,7 @@ class RandomPlanner:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class FixedPlanner:
+class ConstantPlanner:
     """A planner that always takes the same action of each sensor.
 
     Attributes:
@@ -92,7 +92,7 @@ class FixedPlanner:
     """
 
     actions: tuple[Actions, ...]
-    name: ClassVar[str] = "fixed"
+    name: ClassVar[str] = "constant"
 
     def __post_init__(self) -> None:
         expected = "one action of each sensor, such as Actions.of(heading_deg=30.0)"

@@ -39,7 +39,7 @@ from vedette.models.turns import is_turn
 # Identified by the functions themselves: a custom model has none of these forms.
 _LINEAR = {
     (own.transition, own.process_noise_cov)
-    for own in (constant_velocity(1.0, acceleration=kind) for kind in ("held", "continuous"))
+    for own in (constant_velocity(1.0, noise_model=kind) for kind in ("discrete_white", "continuous_white"))
 }
 
 _MEASUREMENTS = {bearing_range().function: BEARING_RANGE, position().function: POSITION}

@@ -136,7 +136,7 @@ def state_notes(
     labels.
     """
     notes = []
-    if settings.undetected_worth and not (sums and state.undetected is not None):
+    if settings.undetected_target_value and not (sums and state.undetected is not None):
         reason = "the state has no intensity of them" if state.undetected is None else "rewards are no sums over labels"
         notes.append(f"targets not found yet are not looked for: {reason}")
     for s, sensor in enumerate(sensors):

@@ -20,7 +20,7 @@ from vedette.platforms import Options
 from vedette.platforms.camera import HALF_WIDTH, POINTING
 from vedette.tracking import State
 
-Rule: TypeAlias = Literal["nearest", "assigned", "centroid"]
+Rule: TypeAlias = Literal["nearest", "assigned_target", "centroid"]
 
 # Weight of the pointing error relative to distances: above rounding, below relevant differences of distances.
 _AIM = 1e-6
@@ -50,15 +50,15 @@ class RulePlanner:
     Attributes:
         sensors: the sensors.
         rule: "nearest": for each sensor, in printed order, its nearest target that no sensor before it took;
-            "assigned": the s-th target, in the order of labels, for the s-th sensor; "centroid": the mean of all, for
-            all sensors.
+            "assigned_target": the s-th target, in the order of labels, for the s-th sensor; "centroid": the mean of
+            all, for all sensors.
         settings: the horizon, over which courses are distinguished.
         constraints: limits on the sensors' courses; each sensor takes its best feasible course, and a joint action that
             is not allowed is replaced by a feasible one near it. If only some sensors may scan, those that come nearest
             do.
         estimate: estimator that extracts targets from the fused belief.
-        targets: for "assigned": the number of each sensor's target instead, counted from 1; numbers beyond the last
-            target start again from the first.
+        targets: for "assigned_target": the number of each sensor's target instead, counted from 1; numbers beyond the
+            last target start again from the first.
 
     Raises:
         InputError: parts of another type, or `targets` with another rule or number of sensors.
@@ -76,8 +76,8 @@ class RulePlanner:
         one_of("rule", self.rule, get_args(Rule))
         if self.targets is not None:
             given = sequence("targets", self.targets, f"{len(self.sensors)} numbers of targets, one a sensor")
-            if self.rule != "assigned" or len(given) != len(self.sensors):
-                expected = f"{len(self.sensors)} numbers of targets, one a sensor, for the rule assigned"
+            if self.rule != "assigned_target" or len(given) != len(self.sensors):
+                expected = f"{len(self.sensors)} numbers of targets, one per sensor, for the rule assigned_target"
                 raise reject("targets", expected, f"{self.targets} for {self.rule}")
             object.__setattr__(self, "targets", tuple(dimension(f"targets[{s}]", own) for s, own in enumerate(given)))
 
@@ -118,7 +118,7 @@ class RulePlanner:
         """Return (num_sensors, 2) m, goals of the sensors (num_sensors, 2) among the places (num_targets, 2)."""
         if self.rule == "centroid":
             return np.tile(places.mean(axis=0), (len(sensors), 1))
-        if self.rule == "assigned":
+        if self.rule == "assigned_target":
             numbers = np.arange(len(sensors)) if self.targets is None else np.array(self.targets) - 1
             return np.asarray(places[numbers % len(places)])
         if beyond is not None:

@@ -60,10 +60,10 @@ class PlanningSettings:
             targets and sensors; "full": the filter's own update, with its data association.
         max_glmb_sensors: with more sensors GLMB beliefs are planned on as LMBs, and plans say so.
         max_glmb_targets: the same with more targets expected.
-        undetected_worth: value of finding a target of `undetected`: a factor on the reward's cost of a missed target
-            (`missed_cost`: for the expected loss, its cutoff to the power of its order); for rewards without such a
-            cost, a number in their units; none: 1 for the former, 0 for the latter; 0: undetected targets are ignored.
-            Undetected targets are assumed not to move.
+        undetected_target_value: value of finding a target of `undetected`: a factor on the reward's cost of a missed
+            target (`missed_cost`: for the expected loss, its cutoff to the power of its order); for rewards without
+            such a cost, a number in their units; none: 1 for the former, 0 for the latter; 0: undetected targets are
+            ignored. Undetected targets are assumed not to move.
         end: s, time of the last scan, on the clock of `State.time`: later decisions are not planned for; None: no end.
         max_prior_hypotheses: most hypotheses, the heaviest, of each local posterior at the start of the horizon. An LMB
             is not reduced.
@@ -98,7 +98,7 @@ class PlanningSettings:
     max_prior_hypotheses: Count = 10
     max_version_divergence: NonNegative = 1e-3
     max_bound_work: Natural = 256
-    undetected_worth: NonNegative | None = None
+    undetected_target_value: NonNegative | None = None
     end: Real | None = None
     confidence: Chance | None = None
     indifference: Share = 0.0

@@ -98,10 +98,10 @@ def drawn_angle(row: Mapping[str, float], heading: str = "heading_deg", azimuth:
 
 
 def describe_action(row: Row) -> str:
-    """Return a row in words: `-30°` for a lone heading or course, else `heading -30°, speed 5, off`, or `still`."""
+    """Return a row in words: `-30°` if only a heading or course, else `heading -30°, speed 5, off`, or `stationary`."""
     if len(row) == 1 and row[0][0] in ("heading_deg", "course_deg"):
         return f"{row[0][1]:g}°"
-    return ", ".join([switch_words(column, x) or _describe_number(column, x) for column, x in row]) or "still"
+    return ", ".join([switch_words(column, x) or _describe_number(column, x) for column, x in row]) or "stationary"
 
 
 def _describe_number(column: str, number: float) -> str:

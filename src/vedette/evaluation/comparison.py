@@ -173,10 +173,10 @@ def compare_scored_scans(scenario: Scenario, ensembles: Mapping[str, Ensemble]) 
     """Return the comparison over the scans that the scenario counts."""
     window, times = scenario.model.ospa, next(iter(ensembles.values())).times
     since, until = None, np.inf
-    if window.from_step is not None:  # a run that stopped earlier has no such scan
-        since = np.inf if window.from_step > len(times) else float(np.nextafter(times[window.from_step - 1], -np.inf))
-    if window.to_step is not None:
-        until = float(times[min(window.to_step, len(times)) - 1])
+    if window.first_scan is not None:  # a run that stopped earlier has no such scan
+        since = np.inf if window.first_scan > len(times) else float(np.nextafter(times[window.first_scan - 1], -np.inf))
+    if window.last_scan is not None:
+        until = float(times[min(window.last_scan, len(times)) - 1])
     return compare_ensembles(ensembles, since=since, until=until, unit=window.unit)
 
 

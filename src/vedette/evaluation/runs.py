@@ -35,9 +35,9 @@ def run_scenario(
 
     Args:
         scenario: from `vedette.scenarios.load_scenario`, or the name or file that it reads.
-        planner: "jdm" (joint), "idm" (independent), "lookahead" (joint, over several decisions), "nearest", "assigned"
-            or "centroid" (rules of thumb), "oracle" and "told" (which know the targets), "random", "fixed", "still",
-            or one of the scenario's own planners; not used if the scans are recorded.
+        planner: "jdm" (joint), "idm" (independent), "lookahead" (joint, over several decisions), "nearest",
+            "assigned_target" or "centroid" (rules of thumb), "oracle" and "true_targets" (which know the targets),
+            "random", "constant", "stationary", or one of the scenario's own planners; not used for recorded scans.
         seed, run: fix every random number; runs with equal seed and number are paired across strategies.
         num_threads: of a decision (0: one per processor); changes no result.
         progress: called with the number of every finished scan.

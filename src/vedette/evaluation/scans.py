@@ -18,7 +18,7 @@ from vedette.recorded.conventions import OWN_SPEEDS
 from vedette.recorded.extents import places_of
 from vedette.recorded.turns import bearings_of
 from vedette.scenarios import Scenario
-from vedette.scenarios.build import build_scan_times, build_true_sensors, drop_outs
+from vedette.scenarios.build import build_scan_times, build_true_sensors, scan_loss_probabilities
 from vedette.scenarios.sections.recording import RecordingSection, recorded_sensors
 from vedette.scenarios.trust import custom_code
 from vedette.simulation.loop import scan_flags_of_run
@@ -51,7 +51,7 @@ def measurement_code(scenario: Scenario) -> tuple[str, ...]:
         dict.fromkeys(
             name
             for sensor in scenario.model.sensors
-            for section in (sensor.measurement, sensor.noise, sensor.detection, sensor.clutter, sensor.truth)
+            for section in (sensor.measurement, sensor.noise, sensor.detection, sensor.clutter, sensor.true_parameters)
             if section is not None
             for name in custom_code(section)
         )
@@ -70,7 +70,7 @@ def scans_of_record(record: RunRecord, scenario: Scenario) -> Scans:
     region, method = model.region.build(), model.filter.gaussian_method
     sensors = [section.build(region, method, scenario.folder) for section in model.sensors]
     true, times = build_true_sensors(scenario, sensors), build_scan_times(scenario)
-    scans_at = scan_flags_of_run(times, drop_outs(scenario), record.num_scans, record.seed, record.run)
+    scans_at = scan_flags_of_run(times, scan_loss_probabilities(scenario), record.num_scans, record.seed, record.run)
     return scans_of_sensors(record, len(true), partial(sensors_at_step, true, scans_at))
 
 

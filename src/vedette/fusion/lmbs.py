@@ -55,13 +55,13 @@ class Clmb:
     makes joint decisions worse, not better.)
 
     Plain weights assume that the sensors have the same field of view: a target that one sensor surely observes is lost
-    if another sensor does not observe its position. With `by_views`, the weights at a label are w_sl proportional to
-    w_s P / (1 - .999 P), where P = E[P_D^s(l)], that is, to the information that a scan has about the existence of a
-    target that is present. A sensor that cannot observe the position of a target (or did not scan) then affects neither
-    its existence nor its density; a sensor that observes the position and lacks the label contributes its floor. If no
-    sensor that scanned observes a label, sensors are weighted by how well they would observe it if they scanned; if no
-    sensor would, those that have the label keep their plain weights. In both modes a target must have one label at all
-    sensors (see `match_labels`).
+    if another sensor does not observe its position. With `field_of_view_weighting`, the weights at a label are w_sl
+    proportional to w_s P / (1 - .999 P), where P = E[P_D^s(l)], that is, to the information that a scan has about the
+    existence of a target that is present. A sensor that cannot observe the position of a target (or did not scan) then
+    affects neither its existence nor its density; a sensor that observes the position and lacks the label contributes
+    its floor. If no sensor that scanned observes a label, sensors are weighted by how well they would observe it if
+    they scanned; if no sensor would, those that have the label keep their plain weights. In both modes a target must
+    have one label at all sensors (see `match_labels`).
 
     Attributes:
         weights: fusion weights, one per sensor, in the order of the beliefs; non-negative, sum 1. A sensor of weight 0
@@ -69,7 +69,8 @@ class Clmb:
         mixture_power: how the power of a mixture is computed; see `CmDeltaGlmb`.
         missing_existence: floor for the existence probability of a label that a sensor lacks, in (0, 1).
         limits: caps on the cost.
-        by_views: whether sensors are weighted by how well they observe each label; `fuse` then needs `views`.
+        field_of_view_weighting: whether sensors are weighted by how well they observe each label; `fuse` then needs
+            `views`.
 
     Raises `InputError` for invalid weights, floor or limits.
     """
@@ -78,13 +79,13 @@ class Clmb:
     mixture_power: MixturePower = "auto"
     missing_existence: float = 1e-4
     limits: FusionLimits = field(default_factory=FusionLimits)
-    by_views: bool = False
+    field_of_view_weighting: bool = False
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "weights", check_weights(self.weights))
         check_power(self.mixture_power, self.limits, len(self.weights))
         chance("missing_existence", self.missing_existence)
-        flag("by_views", self.by_views)
+        flag("field_of_view_weighting", self.field_of_view_weighting)
 
     def fuse(self, beliefs: Sequence[LabelledDensity], views: FieldsOfView | None = None) -> tuple[LMB, FusionInfo]:
         """Return the fused LMB in increasing label order, and the report. Beliefs that are not LMBs are converted.
@@ -94,7 +95,7 @@ class Clmb:
         product of track densities cannot be integrated.
         """
         check_beliefs(beliefs, (LMB, GLMB, FactoredGLMB), len(self.weights))
-        seen = require_views(self.by_views, views, len(self.weights))
+        seen = require_views(self.field_of_view_weighting, views, len(self.weights))
         rule = power_rule(self.mixture_power, self.limits, beliefs[0].state_dim, len(self.weights))
         active, weights = active_sensors(self.weights)
         aligned = align_lmbs([_reduced(beliefs[i], rule.caps) for i in active], self.missing_existence)
@@ -111,11 +112,13 @@ class Clmb:
         return unchecked(LMB, TrackTable.from_kernel(tracks), logits), info
 
     def log_linear_pool(self, num_sensors: int) -> LogLinearPool | None:
-        """Return the pool with these weights; None with `by_views`."""
-        return None if self.by_views else LogLinearPool(0.0, tuple(self.weights), self.missing_existence)
+        """Return the pool with these weights; None with `field_of_view_weighting`."""
+        return None if self.field_of_view_weighting else LogLinearPool(0.0, tuple(self.weights), self.missing_existence)
 
     def precompute(self, cases: Sequence[DensityBatch], prediction: LabelledDensity) -> PowerProducts | None:
-        """Return the fusions of all combinations of cases; None with `by_views`, a GLMB prediction or inexact powers.
+        """Return the fusions of all combinations of cases.
+
+        None with `field_of_view_weighting`, a GLMB prediction or inexact powers.
 
         cases: one batch per sensor; a GLMB is converted first, as in `fuse`. prediction: with one Gaussian per track.
         Raises `InputError` for a wrong number of cases.
@@ -123,7 +126,7 @@ class Clmb:
         check_kinds([own.kind for own in cases], (LMB, GLMB), len(self.weights))
         # A GLMB's labels become mixtures, which auto replaces by one Gaussian; powers of single Gaussians are exact.
         exact = self.mixture_power in ("auto", "moment_matched") or all(own.is_lmb for own in cases)
-        if self.by_views or not exact or not prediction.is_lmb:
+        if self.field_of_view_weighting or not exact or not prediction.is_lmb:
             return None
         active, _ = active_sensors(self.weights)
         shares = [self._share(cases[i], self.weights[i]) for i in active]
@@ -181,12 +184,14 @@ class ArithmeticAverage:
     reduces the existence by its weight. The fused density is never more certain or narrower than the most certain
     sensor, even if the sensors agree.
 
-    With `by_views`, the weights at a label depend on how well each sensor observes it, as in `Clmb`: a sensor that
-    cannot observe the label is left out of it. A target must have one label at all sensors (see `match_labels`).
+    With `field_of_view_weighting`, the weights at a label depend on how well each sensor observes it, as in `Clmb`: a
+    sensor that cannot observe the label is left out of it. A target must have one label at all sensors (see
+    `match_labels`).
 
     Attributes:
         weights: one per sensor, in the order of the beliefs; non-negative, sum 1. A sensor of weight 0 takes no part.
-        by_views: whether sensors are weighted by how well they observe each label; `fuse` then needs `views`.
+        field_of_view_weighting: whether sensors are weighted by how well they observe each label; `fuse` then needs
+            `views`.
         limits: caps on the fused mixtures (`log_min_component_weight`, `merge_distance`, None for 2,
             `max_components`); the others are not used.
 
@@ -194,13 +199,13 @@ class ArithmeticAverage:
     """
 
     weights: Sequence[float] | Floats
-    by_views: bool = False
+    field_of_view_weighting: bool = False
     limits: FusionLimits = field(default_factory=FusionLimits)
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "weights", check_weights(self.weights))
         check_power("moment_matched", self.limits, len(self.weights))
-        flag("by_views", self.by_views)
+        flag("field_of_view_weighting", self.field_of_view_weighting)
 
     def fuse(self, beliefs: Sequence[LabelledDensity], views: FieldsOfView | None = None) -> tuple[LMB, FusionInfo]:
         """Return the fused LMB in increasing label order, and the report. Beliefs that are not LMBs are converted.
@@ -210,7 +215,7 @@ class ArithmeticAverage:
         invalid density or missing views.
         """
         check_beliefs(beliefs, (LMB, GLMB, FactoredGLMB), len(self.weights))
-        seen = require_views(self.by_views, views, len(self.weights))
+        seen = require_views(self.field_of_view_weighting, views, len(self.weights))
         caps = power_rule("component_wise", self.limits, beliefs[0].state_dim).caps
         active, weights = active_sensors(self.weights)
         aligned = align_lmbs([reduced_lmb(beliefs[i], caps) for i in active], 0.0)

@@ -150,14 +150,14 @@ def sum_over_sensors(values: Floats) -> Floats:
     return total
 
 
-def require_views(by_views: bool, views: FieldsOfView | None, num_sensors: int) -> FieldsOfView | None:
+def require_views(field_of_view_weighting: bool, views: FieldsOfView | None, num_sensors: int) -> FieldsOfView | None:
     """Return the fields of view that a fusion uses, None if it uses none. Raises `InputError` if they are missing."""
-    if not by_views:
+    if not field_of_view_weighting:
         return None
     if views is None:
         raise InputError(
-            "views: expected the views of the sensors, as the fusion weights labels by_views; got None (a tracker "
-            "knows them; decisions do not, and go by a fusion of plain weights)"
+            "views: expected the fields of view of the sensors, for field_of_view_weighting; got None (trackers "
+            "provide them; decisions do not, and use a fusion with plain weights)"
         )
     instance("views", views, FieldsOfView)
     if len(views.sensors) != num_sensors:

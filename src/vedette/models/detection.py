@@ -141,7 +141,7 @@ def soft_sector(
     *,
     range_slope: Positive,
     angle_slope: Positive | None = None,
-    cut: bool = False,
+    hard_limit: bool = False,
 ) -> DetectionModel:
     """Detection that falls off gradually at the edges of a sector around the sensor's heading.
 
@@ -157,14 +157,14 @@ def soft_sector(
             `angle_slope` detection does not depend on the angle [rad].
         range_slope: steepness of the edge in range [1/m].
         angle_slope: steepness of the edges in angle; none: sharp ones, and at a half turn none at all [1/rad].
-        cut: True if there is no detection beyond `max_range` and the half width.
+        hard_limit: True if there is no detection beyond `max_range` and the half width.
     """
     slope = 0.0 if angle_slope is None else positive("angle_slope", angle_slope)
-    if not isinstance(cut, bool):
-        raise reject("cut", "true or false", cut)
+    if not isinstance(hard_limit, bool):
+        raise reject("hard_limit", "true or false", hard_limit)
     params = [_guarded(prob_detection), positive("max_range", max_range), half_width("half_width_rad", half_width_rad)]
-    params += [positive("range_slope", range_slope), slope, float(cut)]
-    return DetectionModel(functions.soft_sector, np.array(params), reach=float(max_range) if cut else math.inf)
+    params += [positive("range_slope", range_slope), slope, float(hard_limit)]
+    return DetectionModel(functions.soft_sector, np.array(params), reach=float(max_range) if hard_limit else math.inf)
 
 
 @part("camera", "detection", probability="prob_detection")

@@ -78,26 +78,31 @@ def _cv_continuous_noise(state: Floats, dt: float, params: Floats, out: Floats) 
 
 @part("constant_velocity", "motion")
 def constant_velocity(
-    sigma_v: NonNegative = 5.0, *, acceleration: Literal["held", "continuous"] = "held", method: str = "auto"
+    sigma_v: NonNegative = 5.0,
+    *,
+    noise_model: Literal["discrete_white", "continuous_white"] = "discrete_white",
+    method: str = "auto",
 ) -> MotionModel:
     """Constant velocity with white acceleration noise. State [px, py, vx, vy].
 
-    For an acceleration held within a step (paper section IV, F_k and Q_k), the noise of an axis is sigma_v^2 [[dt^4/4,
-    dt^3/2], [dt^3/2, dt^2]]. For one continuous in time (Bar-Shalom, Li and Kirubarajan 2001, section 6.2.2), it is
-    sigma_v^2 [[dt^3/3, dt^2/2], [dt^2/2, dt]], and two steps have the same noise as one step of their total length.
+    For an acceleration that is constant within a step (paper section IV, F_k and Q_k), the noise of an axis is
+    sigma_v^2 [[dt^4/4, dt^3/2], [dt^3/2, dt^2]]. For white noise in continuous time (Bar-Shalom, Li and Kirubarajan
+    2001, section 6.2.2), it is sigma_v^2 [[dt^3/3, dt^2/2], [dt^2/2, dt]], and two steps have the same noise as one
+    step of their total length.
 
     Args:
-        sigma_v: standard deviation of a held acceleration (paper: 5); of a continuous one the root of its spectral
+        sigma_v: standard deviation of the acceleration (paper: 5); under continuous_white the root of its spectral
             density, in m/s^1.5 [m/s^2].
-        acceleration: whether the acceleration is constant within a step, as in the paper, or white in continuous time.
+        noise_model: discrete_white: the acceleration is constant within a step, as in the paper, and independent
+            between steps; continuous_white: it is white in continuous time.
         method: Gaussian method, see `MotionModel`.
     """
-    one_of("acceleration", acceleration, _CV_NOISE)
+    one_of("noise_model", noise_model, _CV_NOISE)
     params = np.array([non_negative("sigma_v", sigma_v)])
-    return MotionModel(4, _cv_transition, _CV_NOISE[acceleration], np.empty(0), params, _cv_jacobian, method)
+    return MotionModel(4, _cv_transition, _CV_NOISE[noise_model], np.empty(0), params, _cv_jacobian, method)
 
 
-_CV_NOISE = {"held": _cv_noise, "continuous": _cv_continuous_noise}
+_CV_NOISE = {"discrete_white": _cv_noise, "continuous_white": _cv_continuous_noise}
 
 
 @model_function("transition")

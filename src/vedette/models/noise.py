@@ -85,18 +85,18 @@ def constant_noise(stds: Positives) -> NoiseModel:
 
 
 @part("by_axis", "noise")
-def axis_noise(std: PositivePair, growth: NonNegativePair) -> NoiseModel:
-    """Noise of positions: standard deviations std + growth d^2 along each axis, with d the target's offset along it.
+def axis_noise(std: PositivePair, quadratic_growth: NonNegativePair) -> NoiseModel:
+    """Noise of positions: standard deviations std + quadratic_growth d^2 along each axis, d the target's offset on it.
 
     Args:
         std: (2,) standard deviation along x and y at offset 0 [m].
-        growth: (2,) growth with the square of the offset along x and y [1/m].
+        quadratic_growth: (2,) growth with the square of the offset along x and y [1/m].
     """
-    stds, growths = float_array("std", std, (2,)), float_array("growth", growth, (2,))
+    stds, growths = float_array("std", std, (2,)), float_array("quadratic_growth", quadratic_growth, (2,))
     if (stds <= 0.0).any():
         raise reject("std", "2 numbers above 0", std)
     if (growths < 0.0).any():
-        raise reject("growth", "2 numbers of at least 0", growth)
+        raise reject("quadratic_growth", "2 numbers of at least 0", quadratic_growth)
     return NoiseModel(_by_axis, np.concatenate([stds, growths]), 2, stds)
 
 

@@ -34,7 +34,7 @@ class UndetectedModel:
             (num_cells,) mean number in each cell.
         birth_rate: mean number of targets that appear in the region per second; learnt: estimated from the first
             detections, in beliefs that have an intensity of undetected targets [1/s].
-        enters: places of appearance: anywhere in the region, uniformly, or in the cells along its border.
+        birth_density: where targets appear: uniformly in the region, or in the cells along its boundary.
         speed: standard deviation of each of the two components of the velocity [m/s].
         survival: probability of surviving one second; none: that of the survival model over a scan, for a target at
             rest at the centre of a cell.
@@ -47,7 +47,7 @@ class UndetectedModel:
     grid: CellGrid
     expected: float | Floats
     birth_rate: NonNegative | Literal["learnt"] = 0.0
-    enters: Literal["anywhere", "border"] = "anywhere"
+    birth_density: Literal["uniform", "boundary"] = "uniform"
     speed: float = 0.0
     survival: Probability | None = None
     prior_rate: Positive = 0.1
@@ -59,8 +59,8 @@ class UndetectedModel:
             object.__setattr__(self, "birth_rate", non_negative("UndetectedModel.birth_rate", self.birth_rate))
         object.__setattr__(self, "prior_rate", positive("UndetectedModel.prior_rate", self.prior_rate))
         object.__setattr__(self, "speed", non_negative("UndetectedModel.speed", self.speed))
-        if self.enters not in ("anywhere", "border"):
-            raise reject("UndetectedModel.enters", "anywhere or border", self.enters)
+        if self.birth_density not in ("uniform", "boundary"):
+            raise reject("UndetectedModel.birth_density", "uniform or boundary", self.birth_density)
         if self.survival is not None:
             object.__setattr__(self, "survival", probability("UndetectedModel.survival", self.survival))
         field = "UndetectedModel.expected"
@@ -85,7 +85,7 @@ class UndetectedModel:
     @property
     def entering(self) -> Floats:
         """Weight of each cell for targets that appear, (num_cells,); births are in proportion to it."""
-        return np.ones(self.grid.num_cells) if self.enters == "anywhere" else self.grid.border
+        return np.ones(self.grid.num_cells) if self.birth_density == "uniform" else self.grid.border
 
     @property
     def first_rate(self) -> float:

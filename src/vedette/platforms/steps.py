@@ -38,7 +38,7 @@ class GridPlatform:
         length: length of a step [m].
         speed: speed during a step [m/s].
         directions_deg: directions, counter-clockwise from east [deg].
-        stay: whether staying is an action, too, the last one.
+        allow_staying: whether staying is an action, too, the last one.
 
     Raises:
         InputError: no direction, or one that is not finite; a length or speed that is not above 0.
@@ -47,7 +47,7 @@ class GridPlatform:
     length: Positive
     speed: Positive
     directions_deg: Sequence[float] = (0.0, 45.0, 90.0, 135.0, 180.0, -135.0, -90.0, -45.0)
-    stay: bool = True
+    allow_staying: bool = True
 
     def __post_init__(self) -> None:
         check_fields(self)
@@ -66,7 +66,7 @@ class GridPlatform:
         angles = np.radians(self.directions_deg)
         steps = self.length * np.column_stack([np.cos(angles), np.sin(angles)])
         steps[np.abs(steps) < 1e-12 * self.length] = 0.0  # no rounding errors in steps due north
-        return np.concatenate([steps, np.zeros((1, 2))]) if self.stay else steps
+        return np.concatenate([steps, np.zeros((1, 2))]) if self.allow_staying else steps
 
     def course(self, pose: Floats, action: Floats, times: Floats) -> Floats:
         """Return poses during the step, then at its end; the heading is that of the step, and is kept if it stays."""

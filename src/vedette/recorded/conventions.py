@@ -68,7 +68,7 @@ class Conventions:
             `range_km` and `bearing_deg` do. The default of lengths is m; angles have none.
         bearings: zero and sense of bearings and headings: "north", clockwise, like a compass; or "east",
             counter-clockwise, like the library.
-        gather: s; rows of a sensor within this time after its first make one scan, at the mean of their times.
+        scan_window: s; rows of a sensor within this time after its first make one scan, at the mean of their times.
         bad_rows: "refuse": an unreadable row is an error; "skip": it is left out and counted.
 
     Raises:
@@ -78,7 +78,7 @@ class Conventions:
     columns: Mapping[str, str]
     units: Mapping[str, str]
     bearings: Bearings | None = None
-    gather: float = 0.0
+    scan_window: float = 0.0
     bad_rows: Literal["refuse", "skip"] = "refuse"
 
     def __post_init__(self) -> None:
@@ -96,5 +96,5 @@ class Conventions:
             raise reject("bearings", "east or north", self.bearings)
         if self.bad_rows not in ("refuse", "skip"):
             raise reject("bad_rows", "refuse or skip", self.bad_rows)
-        if not 0.0 <= self.gather < math.inf:
-            raise reject("gather", "seconds, at least 0", self.gather)
+        if not 0.0 <= self.scan_window < math.inf:
+            raise reject("scan_window", "seconds, at least 0", self.scan_window)

@@ -290,7 +290,7 @@ def _without_wild(
 
 def _at_instants(rows: list[_Row], how: _Rows, skipped: tuple[str, ...]) -> RecordedScans:
     """Return rows with one sensor and time as scans, scans with one time as instants."""
-    looks, sites, gather = [], how.sites, how.conventions.gather
+    looks, sites, window = [], how.sites, how.conventions.scan_window
     spans = [0.0] * len(sites)
     for s, site in enumerate(sites):
         own = sorted((row for row in rows if row.sensor == s), key=lambda row: row.time)
@@ -298,11 +298,11 @@ def _at_instants(rows: list[_Row], how: _Rows, skipped: tuple[str, ...]) -> Reco
         if turning is not None:
             looks += turning
             continue
-        groups = _groups(own, gather)
+        groups = _groups(own, window)
         if several := [group[-1].time - group[0].time for group in groups if len(group) > 1]:
             spans[s] = float(np.median(several))
         for group in groups:
-            time = math.fsum(row.time for row in group) / len(group) if gather > 0.0 else group[0].time
+            time = math.fsum(row.time for row in group) / len(group) if window > 0.0 else group[0].time
             looks.append(RecordedScan(time, s, _scan(group, site), np.array(group[-1].pose)))
     first = np.zeros((len(sites), max([*map(len, (site.pose for site in sites)), *(len(look.pose) for look in looks)])))
     for s, site in enumerate(sites):
@@ -325,10 +325,10 @@ def _looks_of_turns(
     return [RecordedScan(each.time, sensor, scan[each.rows], each.pose) for each in scans]
 
 
-def _groups(rows: list[_Row], gather: float) -> list[list[_Row]]:
+def _groups(rows: list[_Row], window: float) -> list[list[_Row]]:
     groups: list[list[_Row]] = []
     for row in rows:
-        if groups and row.time - groups[-1][0].time <= gather:
+        if groups and row.time - groups[-1][0].time <= window:
             groups[-1].append(row)
         else:
             groups.append([row])

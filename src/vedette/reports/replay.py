@@ -123,7 +123,7 @@ def sensor_data(name: str, section: SensorSection) -> dict[str, Any]:
     `unturned` is the heading (rad) of a stationary sensor with a uniform view, which has no meaning.
     """
     data: dict[str, Any] = {"name": name, "kind": PLANE_SHAPES.get(section.measurement.kind, "none")}
-    if section.platform.kind == "still" and section.detection.kind in ("constant", "gaussian", "limited_range"):
+    if section.platform.kind == "stationary" and section.detection.kind in ("constant", "gaussian", "limited_range"):
         data["unturned"] = round(math.radians(section.heading_deg), 4)
     if section.detection.kind in ("limited_range", "limited_sector", "soft_sector"):
         data["range"] = section.detection.max_range

@@ -72,7 +72,7 @@ def assumed_motion(given: Mapping[str, Any], speed: float, descriptions: dict[st
         kind = "constant_velocity_height" if has_height else "constant_velocity"
         assumed["motion"] = {"kind": kind, "sigma_v": speed / 20.0}
         if not has_height:
-            assumed["motion"]["acceleration"] = "continuous"
+            assumed["motion"]["noise_model"] = "continuous_white"
         descriptions["motion"] = (
             f"constant velocity{', also in height' if has_height else ''}, process noise {speed / 20.0:g} m/s^1.5 "
             f"(for speeds up to {speed:g} m/s; --max-target-speed)"

@@ -68,7 +68,7 @@ def _track(scenario: Scenario) -> None:
     """Run the first scans without decisions; if sensors may be out of contact, first with all in contact."""
     network, attempts = scenario.model.network, [scenario]
     if network is not None:
-        fully_connected = {"radio_range": None, "hops": None, "loss": 0.0, "delay": 0}
+        fully_connected = {"radio_range": None, "max_hops": None, "link_loss_probability": 0.0, "delay": 0}
         model = scenario.model.model_copy(update={"network": network.model_copy(update=fully_connected)})
         attempts.insert(0, replace(scenario, model=model))
     for each in attempts:

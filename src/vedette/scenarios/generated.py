@@ -227,8 +227,8 @@ targets:
 
 sensor_defaults:
   heading_deg: 0.0
-  platform: {{kind: steps, length: {length}, speed: {speed}}}     # m, m/s; or stay
-  moves_from: first_decision
+  platform: {{kind: grid_moves, length: {length}, speed: {speed}}}     # m, m/s; or stay
+  stationary_until_first_decision: true
   measurement: {{kind: bearing_range}}
   noise:                    # standard deviations that grow with the distance d
     kind: range_dependent
@@ -253,6 +253,6 @@ control:
 ospa: {{cutoff: 100.0, order: 1.0}}
 
 metrics:
-  tracked_of_all: {{kind: tracked_share, min_detection: 0.0}}   # of all targets, seen or not
+  tracked_of_all: {{kind: tracked_fraction, min_detection_probability: 0.0}}   # of all targets, seen or not
 """
 )

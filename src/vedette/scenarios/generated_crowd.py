@@ -151,7 +151,7 @@ birth:                # where a measurement is that no track explains: as few or
   from_measurements: {{expected: {expected}, max_existence: 0.03, std: [5.0, 5.0, 3.0, 3.0]}}
 
 targets:              # drawn anew in each run; one that leaves the square enters anew on the other side
-  {{kind: crowd, number: {number}, std: [3.0, 3.0], death_probability: {deaths}}}    # m/s
+  {{kind: uniform, number: {number}, std: [3.0, 3.0], death_probability: {deaths}}}    # m/s
 
 sensors:
 {sensing}

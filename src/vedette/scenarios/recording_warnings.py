@@ -90,10 +90,10 @@ def _large_scan_window(model: ScenarioModel, recording: RecordedScans) -> Iterat
         if stds is None or sensor.measurement.kind not in PLACED or speed * window <= stds[1]:
             continue
         yield (
-            ("recording", "gather"),
+            ("recording", "scan_window"),
             f"{model.sensor_names[s]}: rows of one scan are {window:.3g} s apart (median), in which a target of "
             f"{speed:g} m/s moves {speed * window:.3g} m, more than the noise ({stds[1]:.3g} m): if it is a turning "
-            "radar, give the sensor `turn: {period: ...}`; else use a smaller `gather`",
+            "radar, give the sensor `turn: {period: ...}`; else use a smaller `scan_window`",
         )
 
 

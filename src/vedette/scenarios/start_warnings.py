@@ -49,8 +49,8 @@ def _moves(sensor: Sensor) -> bool:
     """Return True if the platform, or the carrier of a camera, can move."""
     platform = sensor.platform
     if platform.kind == "camera":
-        platform = getattr(platform, "carrier", None) or platform
-    return platform.kind not in ("still", "camera")
+        platform = getattr(platform, "platform", None) or platform
+    return platform.kind not in ("stationary", "camera")
 
 
 def _is_inside(x: float, y: float, corners: Sequence[tuple[float, float]]) -> bool:

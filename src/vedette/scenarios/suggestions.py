@@ -38,7 +38,7 @@ def _fusions(scenario: Scenario, fusion: Fusion, by_views: bool) -> Iterator[str
     if by_views:
         kind = "arithmetic_average" if fusion.kind == "arithmetic_average" else "clmb"
         for options in _option_sets(scenario, fusion):
-            section = {"kind": kind, "by_views": True, **options}
+            section = {"kind": kind, "field_of_view_weighting": True, **options}
             if is_valid_with(scenario, {"fusion": section}):
                 words = ", ".join(f"{key}: {str(value).lower()}" for key, value in section.items())
                 yield f"fusion: {{{words}}} where sensors do not share a prediction"

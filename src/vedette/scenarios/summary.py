@@ -62,7 +62,7 @@ def summary_rows(model: ScenarioModel) -> list[tuple[str, str]]:
         ("objective", _objective(control)),
         ("search", describe_settings(control.search)),
         *(("constraint", _constraint(section)) for section in control.constraints),
-        *((("sensors move", start),) if (start := moves_from(model)) else ()),
+        *((("sensors move", start),) if (start := first_motion(model)) else ()),
         ("pseudo-scans", f"{control.ideal_measurements} measurements"),
         ("OSPA", describe_settings(model.ospa)),
         *((f"planner {name}", describe_settings(section)) for name, section in model.planners.items()),
@@ -72,15 +72,15 @@ def summary_rows(model: ScenarioModel) -> list[tuple[str, str]]:
 
 def _motion(section: Section) -> str:
     """Return its settings; the root of a spectral density has another unit than an acceleration."""
-    continuous = getattr(section, "acceleration", "") == "continuous"
+    continuous = getattr(section, "noise_model", "") == "continuous_white"
     return describe_settings(section).replace("m/s^2", "m/s^1.5") if continuous else describe_settings(section)
 
 
-def moves_from(model: ScenarioModel) -> str | None:
-    """Return since when the sensors move; None if none does, or not all since the same time."""
-    starts = {sensor.moves_from for sensor in model.sensors if sensor.platform.kind != "still"}
-    words = {"first_decision": "from the first decision on", "start": "from the start on"}
-    return words[starts.pop()] if len(starts) == 1 else None
+def first_motion(model: ScenarioModel) -> str | None:
+    """Return from when the sensors move; None if none does, or not all from the same time."""
+    moving = (sensor for sensor in model.sensors if sensor.platform.kind != "stationary")
+    waits = {sensor.stationary_until_first_decision for sensor in moving}
+    return f"from the {'first decision' if waits.pop() else 'start'} on" if len(waits) == 1 else None
 
 
 def _objective(control: Control) -> str:
@@ -150,7 +150,7 @@ def _fusion(section: AnyFusion) -> str:
     if section.kind in _DESCRIPTIONS:
         return _DESCRIPTIONS[section.kind]
     words = [section.kind, "equal weights" if section.weights is None else f"weights {short_value(section.weights)}"]
-    if section.by_views:
+    if section.field_of_view_weighting:
         words.append("by views")
     if section.kind != "arithmetic_average":
         words.append(f"{section.mixture_power} powers")
@@ -167,7 +167,7 @@ def _steps(steps: Literal["every"] | Sequence[int]) -> str:
 
 def sensing_rows(sensor: Sensor, north: Compass | None = None) -> list[tuple[str, str]]:
     """Return a sensor's platform, measurement and models; directions are compass courses if `north` is given."""
-    carriers = [section for section in (sensor.platform, getattr(sensor.platform, "carrier", None)) if section]
+    carriers = [section for section in (sensor.platform, getattr(sensor.platform, "platform", None)) if section]
     words = [
         _platform(one, None if north is None else directions_as_courses(one, north, sensor.position))
         for one in carriers
@@ -187,7 +187,7 @@ def sensing_rows(sensor: Sensor, north: Compass | None = None) -> list[tuple[str
 def _platform(section: Section, replaced: Mapping[str, tuple[str, object]] | None) -> str:
     if isinstance(section, GridMoves):
         way = f"steps of {section.length:g} m at {section.speed:g} m/s in {len(section.directions_deg)} directions"
-        return f"{way}, or stay" if section.stay else way
+        return f"{way}, or stay" if section.allow_staying else way
     return describe_settings(section, replaced)
 
 
@@ -211,7 +211,7 @@ def _bias(section: BiasSection) -> str:
 
 def _true_differences(sensor: Sensor) -> list[tuple[str, str]]:
     """Return its bias if not 0, its true models if given, and its scan times if it does not scan at every step."""
-    differences, truth = [], sensor.truth
+    differences, truth = [], sensor.true_parameters
     if sensor.bias != BiasSection():
         differences.append(("bias", _bias(sensor.bias)))
     if truth is not None:
@@ -231,8 +231,8 @@ def _true_differences(sensor: Sensor) -> list[tuple[str, str]]:
         differences.append(("scans", f"every {scans.period:g} s from {scans.offset or 0.0:g} s on"))
     elif scans.every > 1:
         differences.append(("scans", f"every {scans.every} steps from step {scans.first}"))
-    if sensor.scans.drop_out:
-        differences.append(("drop-outs", f"{sensor.scans.drop_out:g} of its scans"))
+    if sensor.scans.scan_loss_probability:
+        differences.append(("scan loss", f"{sensor.scans.scan_loss_probability:g} of its scans"))
     if sensor.scans.late is not None:
         differences.append(("late", describe_settings(sensor.scans.late)))
     return differences

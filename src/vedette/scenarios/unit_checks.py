@@ -39,8 +39,8 @@ def _bearings(model: ScenarioModel) -> Iterator[tuple[Path, str]]:
     """Yield warnings of noise so large that bearings carry little information."""
     reported: list[Noise] = []  # noise that sensors share is reported once
     for s, sensor in enumerate(model.sensors):
-        true = None if sensor.truth is None else sensor.truth.noise
-        for path, noise in ((("noise",), sensor.noise), (("truth", "noise"), true)):
+        true = None if sensor.true_parameters is None else sensor.true_parameters.noise
+        for path, noise in ((("noise",), sensor.noise), (("true_parameters", "noise"), true)):
             if noise is not None and noise not in reported:
                 reported.append(noise)
                 yield from _bearing_noise(("sensors", s, *path), sensor.measurement, noise)
@@ -49,8 +49,8 @@ def _bearings(model: ScenarioModel) -> Iterator[tuple[Path, str]]:
 def _biases(model: ScenarioModel) -> Iterator[tuple[Path, str]]:
     """Yield warnings of implausibly large biases."""
     for s, sensor in enumerate(model.sensors):
-        true = None if sensor.truth is None else sensor.truth.bias
-        for path, bias in ((("bias",), sensor.bias), (("truth", "bias"), true)):
+        true = None if sensor.true_parameters is None else sensor.true_parameters.bias
+        for path, bias in ((("bias",), sensor.bias), (("true_parameters", "bias"), true)):
             for name, largest in _MAX_BIAS.items():
                 if bias is not None and abs(value := getattr(bias, name)) > largest:
                     field_path = ("sensors", s, *path, name)
@@ -149,7 +149,7 @@ def _probabilities_per_step(model: ScenarioModel) -> Iterator[tuple[Path, str]]:
 def _held_acceleration(model: ScenarioModel) -> Iterator[tuple[Path, str]]:
     """Yield warnings of accelerations that are held over steps of varying length: shorter steps spread targets less."""
     motion, scans = model.motion, model.horizon[1] / model.time.step_period
-    if getattr(motion, "acceleration", "continuous") != "held" or not getattr(motion, "sigma_v", 0.0):
+    if getattr(motion, "noise_model", "continuous_white") != "discrete_white" or not getattr(motion, "sigma_v", 0.0):
         return
     with_late_scans = [
         name for name, sensor in zip(model.sensor_names, model.sensors, strict=True) if sensor.scans.late
@@ -157,7 +157,7 @@ def _held_acceleration(model: ScenarioModel) -> Iterator[tuple[Path, str]]:
     if model.recording is not None or with_late_scans:
         reason = f"{with_late_scans[0]} has late scans" if with_late_scans else "scans are recorded"
         yield (
-            ("motion", "acceleration"),
+            ("motion", "noise_model"),
             f"it is held from one scan to the next of any sensor, and {reason}: targets spread the less the more scans "
             "there are in between, and clocks cannot be found; say continuous",
         )

@@ -125,7 +125,7 @@ def _unknown_key(path: Path, key: str, known: list[str]) -> Diagnostic:
     if key in ("lon_min", "lon_max", "lat_min", "lat_max"):
         hint = "a box of degrees needs an `origin: {lon: , lat: }` of the scenario, and its four ends in order"
     if key in ("speed", "actions_deg", "headings") and "platform" not in path:
-        hint = "the platform of a sensor has it: `platform: {kind: courses, speed: 50.0, headings_deg: [0, 90]}`"
+        hint = "the platform of a sensor has it: `platform: {kind: heading, speed: 50.0, headings_deg: [0, 90]}`"
     if key in COURSE_KEYS:
         hint = (
             "courses and azimuths count from true north, which needs an `origin` or a sensor with `compass: true`, "

@@ -171,21 +171,21 @@ def _large_cells(model: ScenarioModel) -> Iterator[tuple[Path, str]]:
         return
     for name, sensor in zip(model.sensor_names, model.sensors, strict=True):
         field = field_of_view(sensor)
-        if field is not None and field.reach < 0.5 * model.undetected.cell:
+        if field is not None and field.reach < 0.5 * model.undetected.cell_size:
             yield (
-                ("undetected", "cell"),
-                f"cells of {model.undetected.cell:g} m, and {name} sees as far as {field.reach:g} m: what it sees of a "
-                "cell is taken at nine places in it, and too rough; take cells of at most twice as far as it sees",
+                ("undetected", "cell_size"),
+                f"cells of {model.undetected.cell_size:g} m, and {name} sees as far as {field.reach:g} m: what it sees "
+                "of a cell is taken at nine places in it, and too rough; take cells of at most twice as far as it sees",
             )
             return
 
 
 def _undetected_value(model: ScenarioModel) -> Iterator[tuple[Path, str]]:
     """Yield a warning if the worth of undetected targets was probably given in metres."""
-    worth = model.control.undetected_worth
+    worth = model.control.undetected_target_value
     if worth is not None and worth > _MAX_WORTH and model.control.reward.kind in ("expected_loss", "expected_gospa"):
         yield (
-            ("control", "undetected_worth"),
+            ("control", "undetected_target_value"),
             f"finding a target is worth {worth:g} times what a missed one costs: sensors do little but search; it is a "
             "factor of that cost, mostly 1",
         )
@@ -230,7 +230,7 @@ def _undetected_births(model: ScenarioModel) -> Iterator[tuple[Path, str]]:
 def _different_views(scenario: Scenario) -> Iterator[tuple[Path, str]]:
     model = scenario.model
     fusion = _fusion_by_label(model)
-    if fusion is None or fusion.by_views:
+    if fusion is None or fusion.field_of_view_weighting:
         return
     region = model.region
     axes = (
@@ -324,9 +324,9 @@ def _prob_soft_sector(section: Detection, beyond_range: Floats, beyond_angle: Fl
     prob = section.probability * _logistic(section.range_slope * beyond_range)
     if section.angle_slope is not None:
         prob = prob * _logistic(section.angle_slope * beyond_angle)
-    elif not section.cut:
+    elif not section.hard_limit:
         in_view = beyond_angle <= 0.0
-    return prob if section.angle_slope is not None and not section.cut else np.where(in_view, prob, 0.0)
+    return prob if section.angle_slope is not None and not section.hard_limit else np.where(in_view, prob, 0.0)
 
 
 def _logistic(exponent: Floats) -> Floats:

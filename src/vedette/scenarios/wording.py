@@ -8,7 +8,6 @@ from itertools import pairwise
 from vedette.scenarios.sections.base import Section
 
 _LABELS = {
-    "cut": "hard limit",
     "max_range": "range",
     "relative": "relative to the present heading",
     "sigma_v": "process noise",

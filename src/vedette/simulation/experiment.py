@@ -34,7 +34,7 @@ class Experiment(SummaryRepr):
         decision_steps: scans (counted from 1) that are followed by a decision.
         true_sensors: the sensors that scan; (): they equal the sensor models of the tracker.
         scans_at: (num_sensors, num_scans or more) whether each sensor scans; None: at every step.
-        drop_out: probability of each sensor that a scan is lost; (): none.
+        scan_loss_probability: probability of each sensor that a scan is lost; (): none.
         explain: whether decisions are stored with their explanations, see `vedette.control.Plan.explain`.
 
     Raises:
@@ -52,7 +52,7 @@ class Experiment(SummaryRepr):
     decision_steps: tuple[int, ...]
     true_sensors: tuple[TrueSensor, ...] = ()
     scans_at: Bools | None = None
-    drop_out: tuple[float, ...] = ()
+    scan_loss_probability: tuple[float, ...] = ()
     explain: bool = True
     _scanning: tuple[TrueSensor, ...] = field(init=False, default=())
 
@@ -75,8 +75,9 @@ class Experiment(SummaryRepr):
         if bad:
             raise InputError(f"decision_steps: expected scans from 1 to {len(self.times)}; got {bad[0]}")
         object.__setattr__(self, "_scanning", true_sensors_of(self.true_sensors, self.tracker.sensors))
-        if self.drop_out and (len(self.drop_out) != num or not all(0.0 <= share < 1.0 for share in self.drop_out)):
-            raise InputError(f"drop_out: expected {num} probabilities below 1, one a sensor; got {self.drop_out}")
+        losses = self.scan_loss_probability
+        if losses and (len(losses) != num or not all(0.0 <= loss < 1.0 for loss in losses)):
+            raise InputError(f"scan_loss_probability: expected {num} numbers below 1, one per sensor; got {losses}")
         if self.scans_at is not None:
             self._check_scans_at(np.asarray(self.scans_at))
 

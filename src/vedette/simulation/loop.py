@@ -35,17 +35,19 @@ def sensor_streams(seed: int, run: int, stream: int, num_sensors: int) -> tuple[
 
 
 def scan_flags_of_run(
-    scans_at: Bools | None, drop_out: Sequence[float], num_scans: int, seed: int, run: int
+    scans_at: Bools | None, scan_loss_probability: Sequence[float], num_scans: int, seed: int, run: int
 ) -> Bools | None:
     """(num_sensors, num_scans or more) whether each sensor scans in a run, without lost scans; None: always.
 
-    scans_at, drop_out: see `Experiment`. Each sensor loses scans by random numbers of its own. Its other scans are
-    therefore those of a run without losses, except for the numbers drawn meanwhile.
+    scans_at, scan_loss_probability: see `Experiment`. Each sensor loses scans by random numbers of its own. Its other
+    scans are therefore those of a run without losses, except for the numbers drawn meanwhile.
     """
-    if not drop_out:
+    if not scan_loss_probability:
         return scans_at
-    streams = sensor_streams(seed, run, DROP_OUTS, len(drop_out))
-    taking_place = np.array([rng.random(num_scans) >= share for rng, share in zip(streams, drop_out, strict=True)])
+    streams = sensor_streams(seed, run, DROP_OUTS, len(scan_loss_probability))
+    taking_place = np.array(
+        [rng.random(num_scans) >= share for rng, share in zip(streams, scan_loss_probability, strict=True)]
+    )
     return taking_place if scans_at is None else taking_place & scans_at[:, :num_scans]
 
 
@@ -111,7 +113,9 @@ class SimulationRun:
         self.truth = truth_of_run(experiment, seed, run) if truth is None else truth
         scans, filters = (sensor_streams(seed, run, stream, experiment.num_sensors) for stream in (SCANS, FILTER))
         self._scan_rngs = scans
-        self._scans_at = scan_flags_of_run(experiment.scans_at, experiment.drop_out, len(experiment.times), seed, run)
+        self._scans_at = scan_flags_of_run(
+            experiment.scans_at, experiment.scan_loss_probability, len(experiment.times), seed, run
+        )
         self._tracker = RunningTracker(experiment.tracker, experiment.estimate, self.truth, filters)
         self.fleet = experiment.fleet(moving=moving)
         self.outcome: ScanOutcome | None = None
@@ -203,7 +207,7 @@ def simulate(
         VedetteError: the true targets cannot be drawn.
         RunStopped, RunInterrupted: models, tracker, estimate, planner or score raised, see `Journal.run_of`.
     """
-    name = "still" if planner is None else planner.name
+    name = "stationary" if planner is None else planner.name
     truth = truth_of_run(experiment, seed, run)
     journal = Journal(experiment.name, name, seed, run, truth, experiment.num_sensors)
     with suppress_unit_warnings():  # no warnings of implausible numbers in simulated scans

@@ -31,7 +31,7 @@ def scans_of(record: RunRecord, experiment: Experiment) -> tuple[tuple[Scan | No
         VedetteError: as the models.
     """
     scans_at = scan_flags_of_run(
-        experiment.scans_at, experiment.drop_out, len(experiment.times), record.seed, record.run
+        experiment.scans_at, experiment.scan_loss_probability, len(experiment.times), record.seed, record.run
     )
     return scans_of_sensors(record, experiment.num_sensors, partial(experiment.sensors_at, scans_at=scans_at))
 

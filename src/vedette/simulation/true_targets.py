@@ -55,7 +55,7 @@ class TrueTargetsPlanner:
     cutoff: float = 100.0
     estimate: Estimator = best_estimate
     truth: Truth | None = None
-    name: ClassVar[str] = "told"
+    name: ClassVar[str] = "true_targets"
 
     def __post_init__(self) -> None:
         check_sensors(self.sensors)

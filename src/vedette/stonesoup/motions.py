@@ -137,7 +137,7 @@ def _of_axes(model: Any) -> tuple[MotionModel, StateLayout]:
     noise = _densities([axis.noise_diff_coeff for axis in axes], "model_list: noise_diff_coeff")
     layout = StateLayout(tuple(axis * num + i for i in range(num) for axis in range(2)))
     if num == 2 and noise[0] == noise[1]:
-        return constant_velocity(math.sqrt(noise[0]), acceleration="continuous"), layout
+        return constant_velocity(math.sqrt(noise[0]), noise_model="continuous_white"), layout
     return MotionModel(2 * num, _taylor, _integrated_noise, np.empty(0), noise, _taylor_jacobian), layout
 
 

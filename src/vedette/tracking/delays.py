@@ -20,24 +20,24 @@ class Delay:
     """Distribution of the delays of a sensor's scans.
 
     Attributes:
-        share: probability that a scan is delayed.
-        up_to: largest delay in s; delays are uniform from 0 to it.
+        probability: probability that a scan is delayed.
+        max_delay: largest delay in s; delays are uniform from 0 to it.
         start, end: times in s; scans taken before `start` or after `end` arrive at once.
         window: s; a scan delayed by more than this is lost.
 
     Raises:
-        InputError: a share that is not a probability, times that are not numbers, or an end before the start.
+        InputError: a probability outside 0 to 1, times that are not numbers, or an end before the start.
     """
 
-    share: float
-    up_to: float
+    probability: float
+    max_delay: float
     start: float = -math.inf
     end: float = math.inf
     window: float = math.inf
 
     def __post_init__(self) -> None:
-        probability("Delay.share", self.share)
-        positive("Delay.up_to", self.up_to)
+        probability("Delay.probability", self.probability)
+        positive("Delay.max_delay", self.max_delay)
         if not self.window >= 0.0:
             raise reject("Delay.window", "seconds, at least 0", self.window)
         if not self.start <= self.end:
@@ -46,7 +46,7 @@ class Delay:
     def sample(self, time: float, rng: np.random.Generator) -> float:
         """Draw the delay of a scan of this time, in s; always draws two random numbers."""
         uniform, fraction = rng.random(2).tolist()
-        return self.up_to * fraction if self.start <= time <= self.end and uniform < self.share else 0.0
+        return self.max_delay * fraction if self.start <= time <= self.end and uniform < self.probability else 0.0
 
 
 class _PendingScan(NamedTuple):
@@ -88,7 +88,7 @@ class DelayedScanTracker(TrackerWrapper):
             if count("delays", s) >= len(self.sensors):
                 raise reject("delays", f"sensors from 0 to {len(self.sensors) - 1}", s)
             instance(f"delays[{s}]", delay, Delay)
-        longest = (min(delay.up_to, delay.window) for delay in self.delays.values())
+        longest = (min(delay.max_delay, delay.window) for delay in self.delays.values())
         object.__setattr__(self, "_window", max(longest, default=0.0) + 1.0)
 
     def initial(self) -> State:

@@ -28,8 +28,8 @@ class Network:
 
     Attributes:
         radio_range: distance up to which two sensors have a link; none: unlimited [m].
-        hops: maximum number of links that a message may travel; none: unlimited.
-        loss: probability that a link fails at a scan, in both directions, for all messages.
+        max_hops: maximum number of links that a message may travel; none: unlimited.
+        link_loss_probability: probability that a link fails at a scan, in both directions, for all messages.
         delay: number of scans that a message takes for each link.
         consensus_rounds: rounds of averaging with the neighbours (Metropolis weights) after each scan, instead of
             passing messages on; for fusions of densities; none: no consensus.
@@ -39,30 +39,30 @@ class Network:
     """
 
     radio_range: Limit = math.inf
-    hops: Count | None = None
-    loss: Share = 0.0
+    max_hops: Count | None = None
+    link_loss_probability: Share = 0.0
     delay: Natural = 0
     consensus_rounds: Count | None = None
 
     def __post_init__(self) -> None:
         check_fields(self, "Network.")
-        if self.consensus_rounds is not None and (self.delay > 0 or self.hops is not None):
+        if self.consensus_rounds is not None and (self.delay > 0 or self.max_hops is not None):
             raise reject("Network.consensus_rounds", "None with a delay or a number of hops", self.consensus_rounds)
 
     @property
     def _hop_limit(self) -> int:
-        return NEVER - 1 if self.hops is None else self.hops
+        return NEVER - 1 if self.max_hops is None else self.max_hops
 
     def links(self, poses: Floats, rng: np.random.Generator) -> Bools:
         """Return the direct links, (num_sensors, num_sensors): symmetric, False on the diagonal.
 
-        Random numbers are drawn from `rng` only if links can fail (`loss` > 0).
+        Random numbers are drawn from `rng` only if links can fail (`link_loss_probability` > 0).
         """
         offsets = poses[:, None, :2] - poses[None, :, :2]
         linked: Bools = np.hypot(offsets[..., 0], offsets[..., 1]) <= self.radio_range
         np.fill_diagonal(linked, False)
-        if self.loss > 0.0:
-            intact = np.triu(rng.random(linked.shape) >= self.loss, 1)
+        if self.link_loss_probability > 0.0:
+            intact = np.triu(rng.random(linked.shape) >= self.link_loss_probability, 1)
             linked &= intact | intact.T
         return linked
 

@@ -166,9 +166,9 @@ def _filling(
 def undetected_target_value(reward: Any, settings: PlanningSettings) -> float:
     """Return the value of finding an undetected target, in units of the reward."""
     if not provides(reward, HasMissedCost):
-        return settings.undetected_worth or 0.0
+        return settings.undetected_target_value or 0.0
     cost: float = reward.missed_cost
-    return cost * (1.0 if settings.undetected_worth is None else settings.undetected_worth)
+    return cost * (1.0 if settings.undetected_target_value is None else settings.undetected_target_value)
 
 
 def no_cells(num_courses: int) -> Cells:

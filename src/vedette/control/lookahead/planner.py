@@ -59,8 +59,8 @@ class HorizonPlanner:
     certain, while targets will deviate from their prediction, and later decisions correct earlier ones. A divergence
     measures all information gained until then, so that the sum counts early information several times. Without a
     discount only the reward at the end of the last horizon counts. Late information then weighs most, and repeated
-    decisions may postpone their intended action. Undetected targets (`PlanningSettings.undetected_worth`) are assumed
-    not to move, and count with the expected number that all scans until then find.
+    decisions may postpone their intended action. Undetected targets (`PlanningSettings.undetected_target_value`) are
+    assumed not to move, and count with the expected number that all scans until then find.
 
     The best single decision, repeated, is the first sequence evaluated, so no plan has a lower value. Plans note if the
     depth did not improve on it.

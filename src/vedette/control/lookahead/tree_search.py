@@ -28,7 +28,7 @@ class TreeSearch:
 
     Attributes:
         exploration: weight of rarely tried branches.
-        rollout: "random": courses drawn at random; "kept": every sensor repeats its last action.
+        rollout: "random": courses drawn at random; "repeat_last": every sensor repeats its last action.
         batch: rollouts that are evaluated together, which is faster; each counts as a visit before its value is known.
 
     Raises:
@@ -36,13 +36,13 @@ class TreeSearch:
     """
 
     exploration: float = 0.3
-    rollout: Literal["random", "kept"] = "random"
+    rollout: Literal["random", "repeat_last"] = "random"
     batch: int = 16
 
     def __post_init__(self) -> None:
         non_negative("exploration", self.exploration)
         dimension("batch", self.batch)
-        one_of("rollout", self.rollout, ("random", "kept"))
+        one_of("rollout", self.rollout, ("random", "repeat_last"))
 
     def search(self, problem: SequenceProblem, *, rng: np.random.Generator) -> None:
         """Search until the budget is used up, or all sequences are evaluated."""
@@ -145,13 +145,13 @@ class _Climb:
 
     def _rolled_out(self, sensor: int, joint: JointSequence) -> Sequence | None:
         problem, taken = self.problem, joint[sensor]
-        if self.search.rollout == "kept" and taken:
+        if self.search.rollout == "repeat_last" and taken:
             return problem.kept(sensor, taken, joint)
         while len(taken) < problem.depth:
             allowed = problem.after(sensor, taken, joint)
             if not allowed:  # a random choice led to a dead end
                 return problem.kept(sensor, joint[sensor], joint)
             taken = (*taken, allowed[int(self.rng.integers(len(allowed)))])
-            if self.search.rollout == "kept":
+            if self.search.rollout == "repeat_last":
                 return problem.kept(sensor, taken, joint)
         return taken

@@ -31,7 +31,7 @@ class CrossEntropy(Checked):
 
     Attributes:
         num_samples: joint actions drawn in a round.
-        elite_share: fraction of these that the probabilities move towards, in (0, 1).
+        elite_fraction: fraction of these that the probabilities move towards, in (0, 1).
         smoothing: step size of the probabilities in a round, in (0, 1]; 1: a full step.
         max_rounds: maximum number of rounds.
 
@@ -40,7 +40,7 @@ class CrossEntropy(Checked):
     """
 
     num_samples: Count = 200
-    elite_share: Chance = 0.1
+    elite_fraction: Chance = 0.1
     smoothing: Portion = 0.7
     max_rounds: Count = 50
 
@@ -48,7 +48,7 @@ class CrossEntropy(Checked):
         """Return the best joint action drawn; of equal ones the first in printed order."""
         known = RewardCache(problem)
         probabilities = _uniform(known)
-        num_elite = math.ceil(self.elite_share * self.num_samples)
+        num_elite = math.ceil(self.elite_fraction * self.num_samples)
         drawn = [known.allowed(problem.independent())]
         for _ in range(self.max_rounds):
             drawn += known.all_allowed(_draw(known.mask, probabilities, self.num_samples, rng))

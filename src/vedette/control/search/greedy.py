@@ -28,7 +28,7 @@ class SequentialGreedy(Checked):
     the end, by the fewest changes found (`vedette.control.constraints.nearest_feasible`, `relaxed`).
 
     Attributes:
-        order: "printed": in the order of the sensors. "best_first": always the sensor that adds most; its gain is
+        order: "sensor_order": in the order of the sensors. "best_first": always the sensor that adds most; its gain is
             assumed to shrink as others are decided, which saves most of the evaluations (lazy greedy; Minoux 1978). The
             gain may grow if another sensor leaves a target; such a sensor is then evaluated later than it should be.
 
@@ -36,7 +36,7 @@ class SequentialGreedy(Checked):
         InputError: another order.
     """
 
-    order: Literal["printed", "best_first"] = "printed"
+    order: Literal["sensor_order", "best_first"] = "sensor_order"
 
     def search(self, problem: JointProblem, *, rng: np.random.Generator) -> tuple[int, ...]:
         """Return the joint action decided in this way; nothing is drawn.
@@ -48,7 +48,7 @@ class SequentialGreedy(Checked):
             raise InputError(f"search: expected {expected}; got none; search by CoordinateAscent")
         known = RewardCache(problem)
         steps = _Steps(known, problem.partial)
-        if self.order == "printed":
+        if self.order == "sensor_order":
             for sensor in range(len(problem.shape)):
                 steps.take(sensor, steps.best(sensor))
         else:

@@ -23,7 +23,7 @@ class TimeToTrack:
     Attributes:
         cutoff: c > 0, m, finite.
         order: order p >= 1 of the matching, finite.
-        from_step: targets that appear before this scan do not count; with 2, those present at the first scan.
+        first_scan: targets that appear before this scan do not count; with 2, those present at the first scan.
 
     Raises:
         InputError: an argument out of range.
@@ -31,7 +31,7 @@ class TimeToTrack:
 
     cutoff: float
     order: float
-    from_step: Count = 2
+    first_scan: Count = 2
 
     def __post_init__(self) -> None:
         check_parameters(self.cutoff, self.order, finite=True)
@@ -48,7 +48,7 @@ class TimeToTrack:
             truth.scans[first],
             truth.times[truth.scans[last_rows]] - truth.times[truth.scans[first]],
         )
-        counts = first_scans + 1 >= self.from_step
+        counts = first_scans + 1 >= self.first_scan
         number = np.bincount(first_scans[counts], minlength=truth.num_scans)
         total = np.bincount(first_scans[counts], waiting_times[counts], truth.num_scans)
         return np.where(number > 0, total / np.maximum(number, 1), np.nan)

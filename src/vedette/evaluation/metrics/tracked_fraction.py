@@ -17,25 +17,28 @@ from vedette.simulation.records import RunRecord
 from vedette.simulation.truth import Truth
 
 
-def targets_in_view(truth: Truth, poses: Floats, sensors: Sequence[SensorModel], *, min_detection: float) -> Bools:
-    """Return True for each row of `Truth.states` that some sensor detects with at least `min_detection`, (total,).
+def targets_in_view(
+    truth: Truth, poses: Floats, sensors: Sequence[SensorModel], *, min_detection_probability: float
+) -> Bools:
+    """Return True for each row of `Truth.states` that some sensor detects with at least this probability, (total,).
 
     Args:
         truth: the targets at every scan.
         poses: (num_scans, num_sensors, pose_dim) poses of the sensors.
         sensors: model of each sensor, in the order of the poses.
-        min_detection: probability of detection, 0 to 1; it counts even if the sensor does not scan at that time.
+        min_detection_probability: probability of detection, 0 to 1; it counts even if the sensor does not scan at that
+            time.
 
     Raises `InputError` for an argument out of range, or another number of sensors than the poses have.
     """
-    probability("min_detection", min_detection)
+    probability("min_detection_probability", min_detection_probability)
     if poses.shape[:2] != (truth.num_scans, len(sensors)):
         raise reject("sensors", f"one for each of {poses.shape[1]} sensors", f"{len(sensors)}")
     in_view = np.zeros(len(truth.states), np.bool_)
     for scan in range(truth.num_scans):
         rows = slice(truth.offsets[scan], truth.offsets[scan + 1])
         for pose, sensor in zip(poses[scan], sensors, strict=True):
-            in_view[rows] |= sensor.detection.prob(truth.states[rows], pose) >= min_detection
+            in_view[rows] |= sensor.detection.prob(truth.states[rows], pose) >= min_detection_probability
     return in_view
 
 
@@ -49,7 +52,7 @@ class TrackedFraction:
         sensors: true model of each sensor.
         cutoff: c > 0, m, finite.
         order: order p >= 1 of the matching, finite.
-        min_detection: smallest probability of detection of a visible target.
+        min_detection_probability: smallest probability of detection of a visible target.
 
     Raises:
         InputError: an argument out of range.
@@ -58,16 +61,16 @@ class TrackedFraction:
     sensors: tuple[SensorModel, ...]
     cutoff: float
     order: float
-    min_detection: Probability = 0.5
+    min_detection_probability: Probability = 0.5
 
     def __post_init__(self) -> None:
         check_parameters(self.cutoff, self.order, finite=True)
-        probability("min_detection", self.min_detection)
+        probability("min_detection_probability", self.min_detection_probability)
 
     def __call__(self, record: RunRecord) -> Floats:
         """Return the share, (num_scans,); raise `InputError` as `match_run` does, and for another number of sensors."""
         truth = record.truth
-        in_view = targets_in_view(truth, record.poses, self.sensors, min_detection=self.min_detection)
+        in_view = targets_in_view(truth, record.poses, self.sensors, min_detection_probability=self.min_detection_probability)
         matching = match_run(truth, record.estimates, cutoff=self.cutoff, order=self.order)
         tracked = np.zeros(len(in_view), np.bool_)
         tracked[matching.truth_rows] = True

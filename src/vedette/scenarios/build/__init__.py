@@ -10,7 +10,7 @@ from vedette.scenarios.build.sensors import (
     build_scan_times,
     build_sensors,
     build_true_sensors,
-    drop_outs,
+    scan_loss_probabilities,
 )
 from vedette.scenarios.build.trackers import scene_for_program
 
@@ -24,6 +24,6 @@ __all__ = [
     "build_targets",
     "build_tracking",
     "build_true_sensors",
-    "drop_outs",
+    "scan_loss_probabilities",
     "scene_for_program",
 ]

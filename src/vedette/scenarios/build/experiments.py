@@ -11,8 +11,8 @@ from vedette.scenarios.build.sensors import (
     build_scan_times,
     build_sensors,
     build_true_sensors,
-    drop_outs,
     first_actions,
+    scan_loss_probabilities,
 )
 from vedette.scenarios.build.trackers import build_tracker
 from vedette.scenarios.loading import Scenario
@@ -42,16 +42,18 @@ def build_experiment(scenario: Scenario) -> Experiment:
         platforms=tuple(sensor.platform for sensor in sensors),
         poses=build_poses(scenario),
         first_actions=tuple(
-            actions.values[0] if section.moves_from == "start" else None
+            actions.values[0] if not section.stationary_until_first_decision else None
             for actions, section in zip(first_actions(scenario, sensors), model.sensors, strict=True)
         ),
         estimate=model.estimates_by.build(scenario.folder),
         decision_steps=model.decision_steps,
         explain=model.control.explain,
         # Empty if all match the tracker's models, so that a tracker of other sensors may replace this one.
-        true_sensors=build_true_sensors(scenario, assumed) if any(sensor.truth for sensor in model.sensors) else (),
+        true_sensors=build_true_sensors(scenario, assumed)
+        if any(sensor.true_parameters for sensor in model.sensors)
+        else (),
         scans_at=None if times.all() else times,
-        drop_out=drop_outs(scenario),
+        scan_loss_probability=scan_loss_probabilities(scenario),
     )
 
 

@@ -21,11 +21,11 @@ from vedette.tracking import Network
 
 
 def build_planner(scenario: Scenario, name: str, num_threads: int = 0) -> Planner | None:
-    """Return the planner of a strategy; None for `still`, with which the sensors never move.
+    """Return the planner of a strategy; None for `stationary`, with which the sensors never move.
 
     The strategies are `jdm` (joint), `idm` (independent), `lookahead` (joint, over several decisions), `nearest`,
-    `assigned`, `centroid` (rules of thumb), `oracle` and `told` (which know the targets), `random`, `fixed` (sensors
-    keep their first course), and the scenario's own planners.
+    `assigned_target`, `centroid` (rules of thumb), `oracle` and `true_targets` (which know the targets), `random`,
+    `constant` (sensors keep their first course), and the scenario's own planners.
 
     Args:
         scenario: with the sensors that the planner controls.
@@ -81,7 +81,11 @@ def _schedule(scenario: Scenario) -> Schedule:
     model, num = scenario.model, len(scenario.model.sensors)
     section, powers = model.fusion, (1.0,) * num
     is_shared = section.kind in SINGLE_BELIEF_FUSIONS or isinstance(section, CustomFusion) or section.feeds_back
-    if not isinstance(section, CustomFusion) and section.kind in ("clmb", "cm_delta_glmb") and not section.by_views:
+    if (
+        not isinstance(section, CustomFusion)
+        and section.kind in ("clmb", "cm_delta_glmb")
+        and not section.field_of_view_weighting
+    ):
         powers = section.scaled_weights(num)
     birth, scans = model.birth, build_scan_times(scenario)
     rebirths = birth.from_measurements is not None or birth.steps == "every"
@@ -98,7 +102,9 @@ def _decision_notes(scenario: Scenario, fusion: Fusion, strategy: Strategy) -> t
     notes = []
     in_full = isinstance(fusion, ParallelUpdate) or reward.kind == "expected_loss"
     if in_full and not ignores_others and section.kind not in (*FULL_INFORMATION_FUSIONS, "none"):
-        rule = f"{section.kind} by views" if section.kind != "custom" and section.by_views else section.kind
+        rule = (
+            f"{section.kind} by views" if section.kind != "custom" and section.field_of_view_weighting else section.kind
+        )
         notes.append(f"joint rewards take all scans in full; tracks are fused by another rule ({rule})")
     if model.network is not None and model.network.build() != Network():
         notes.append("decided by one who hears every sensor at once, whatever the network lets through")

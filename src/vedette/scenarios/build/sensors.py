@@ -96,7 +96,7 @@ def _check_custom_parts(scenario: Scenario, section: Sensor, sensor: SensorModel
     if has_measured_births and sensor.measurement.places is None and isinstance(measured, Custom):
         expected = f"{measured.function} to give a measurement with `places`, as targets are born of measurements"
         raise MissingMember(measured, "function", expected, "one without")
-    may_skip_scans = section.scans.drop_out or section.scans.late or not section.scans.build(model.time).all()
+    may_skip_scans = section.scans.scan_loss_probability or section.scans.late or not section.scans.build(model.time).all()
     may_skip_scans = may_skip_scans or section.switchable or (model.network is not None and model.network.delay)
     if (
         isinstance(model.filter, CustomFilter)
@@ -116,9 +116,9 @@ def build_true_sensors(scenario: Scenario, assumed: Sequence[SensorModel]) -> tu
     return tuple(section.build_true(sensor, region, scenario.folder) for section, sensor in pairs)
 
 
-def drop_outs(scenario: Scenario) -> tuple[float, ...]:
+def scan_loss_probabilities(scenario: Scenario) -> tuple[float, ...]:
     """Return the probability of each sensor that a scan does not take place; () if all are 0."""
-    probabilities = tuple(sensor.scans.drop_out or 0.0 for sensor in scenario.model.sensors)
+    probabilities = tuple(sensor.scans.scan_loss_probability or 0.0 for sensor in scenario.model.sensors)
     return probabilities if any(probabilities) else ()
 
 

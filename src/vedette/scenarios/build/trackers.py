@@ -64,7 +64,7 @@ def _network_merging(num_sensors: int, *, of_lmbs: bool, own_labels: bool) -> Fu
     """
     equal = (1.0 / num_sensors,) * num_sensors
     if of_lmbs:
-        return LabelMatchedFusion(Clmb(equal, by_views=True))
+        return LabelMatchedFusion(Clmb(equal, field_of_view_weighting=True))
     return LabelMatchedFusion(CmDeltaGlmb(equal)) if own_labels else CmDeltaGlmb(equal)
 
 
@@ -95,7 +95,7 @@ def scene_for_program(scenario: Scenario) -> dict[str, Any]:
     """Return the data of a scenario that a program receives: its sections as plain data, and the horizon."""
     model, (horizon_steps, horizon_period) = scenario.model, scenario.model.horizon
     scene = model.model_dump(mode="json", include=_SCENE_SECTIONS)
-    scene["sensors"] = [sensor.model_dump(mode="json", exclude={"truth"}) for sensor in model.sensors]
+    scene["sensors"] = [sensor.model_dump(mode="json", exclude={"true_parameters"}) for sensor in model.sensors]
     if model.by_compass:
         scene["sensors"] = [
             sensor_as_courses(data, sensor, model.north())

@@ -180,7 +180,7 @@ def _targets(model: ScenarioModel) -> Iterator[Finding]:
     if model.targets.kind == "poisson":
         for name in ("mean", "std"):
             yield from readable_findings(_state_length(("targets", name), model.targets, name, model))
-    if model.targets.kind == "crowd" and len(model.targets.std) != (rest := model.motion.state_dim - 2):
+    if model.targets.kind == "uniform" and len(model.targets.std) != (rest := model.motion.state_dim - 2):
         wanted = f"{rest} numbers, as a state under motion has but the position"
         yield ("targets", "std"), wanted, describe(model.targets.std)
     if model.targets.kind != "scripted":
@@ -223,7 +223,7 @@ def _scans_of_unlabelled(model: ScenarioModel) -> Iterator[Finding]:
         if sensor.scans.late is not None:
             wanted = f"none, as {kind} filters cannot predict without a scan ({LABELLING} can)"
             yield ("sensors", i, "scans", "late"), wanted, "late scans"
-        if sensor.scans.drop_out or not sensor.scans.build(model.time).all():
+        if sensor.scans.scan_loss_probability or not sensor.scans.build(model.time).all():
             yield ("sensors", i, "scans"), f"every step, as {kind} filters go on from each scan", "only some"
         if sensor.switchable:
             yield ("sensors", i, "switchable"), f"false, as {kind} filters go on from each scan", "true"
@@ -250,7 +250,7 @@ def _first_scan(path: Path, sensor: Sensor, model: ScenarioModel) -> Iterator[Fi
 
 
 def _score(model: ScenarioModel) -> Iterator[Finding]:
-    for name in ("from_step", "to_step"):
+    for name in ("first_scan", "last_scan"):
         yield from readable_findings(_last_step(("ospa", name), model.ospa, name, model))
     if model.ospa.components == "state" and model.targets.kind == "recorded" and model.motion.state_dim != RECORDED_DIM:
         wanted = f"position, as states have {model.motion.state_dim} components and recorded targets {RECORDED_DIM}"

@@ -203,7 +203,7 @@ def longer_plans(model: ScenarioModel) -> Iterator[Finding]:
 def targets_of_rules(model: ScenarioModel) -> Iterator[Finding]:
     """Yield faults of rules without one target for each sensor."""
     for name, own in model.planners.items():
-        if own.kind == "assigned" and own.targets is not None and len(own.targets) != len(model.sensors):
+        if own.kind == "assigned_target" and own.targets is not None and len(own.targets) != len(model.sensors):
             wanted = f"{len(model.sensors)} numbers, one a sensor"
             yield ("planners", name, "targets"), wanted, describe(list(own.targets))
 

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 COURSE_KEYS = ("course_deg", "courses_deg", "azimuth_deg", "azimuths_deg")
 _HEADING_KEYS = {"heading_deg", "headings_deg", "directions_deg", "pointing_deg", "pointings_deg"}
 # New name of the key `courses_deg` of a platform, by its kind.
-_LISTS = {"courses": "headings_deg", "steps": "directions_deg"}
+_LISTS = {"heading": "headings_deg", "grid_moves": "directions_deg"}
 
 
 def courses_to_headings(data: Mapping[str, Any]) -> Mapping[str, Any]:
@@ -79,8 +79,8 @@ def sensor_as_courses(data: Mapping[str, Any], sensor: Sensor, compass: Compass)
 def _platform_as_courses(data: Mapping[str, Any], platform: Section, compass: Compass, place: Any) -> dict[str, Any]:
     courses = directions_as_courses(platform, compass, place)
     converted = dict(courses.get(key, (key, value)) for key, value in data.items())
-    if isinstance(carrier := getattr(platform, "carrier", None), Section):
-        converted["carrier"] = _platform_as_courses(data["carrier"], carrier, compass, place)
+    if isinstance(carrier := getattr(platform, "platform", None), Section):
+        converted["platform"] = _platform_as_courses(data["platform"], carrier, compass, place)
     return converted
 
 
@@ -112,7 +112,7 @@ def _heading_keys(key: str) -> Collection[str]:
 def _keys(part: Mapping[str, Any]) -> Iterator[str]:
     """Yield the keys of a sensor, its platform and that platform's carrier."""
     platform = part.get("platform")
-    for section in (part, platform, platform.get("carrier") if _is_mapping(platform) else None):
+    for section in (part, platform, platform.get("platform") if _is_mapping(platform) else None):
         if _is_mapping(section):
             yield from map(str, section)
 
@@ -135,8 +135,8 @@ def _platform(data: Mapping[str, Any], compass: Compass, place: Any) -> dict[str
             converted = _convert_key(
                 converted, key, name, lambda given: [-each if is_relative else _heading(each) for each in given]
             )
-    if _is_mapping(converted.get("carrier")):
-        converted["carrier"] = _platform(converted["carrier"], compass, place)
+    if _is_mapping(converted.get("platform")):
+        converted["platform"] = _platform(converted["platform"], compass, place)
     return converted
 
 

@@ -139,7 +139,7 @@ class Lookahead(Section):
     exploration: Probability | None = Field(
         default=None, description="Of tree: weight of what was seldom tried; none: 0.3 [-]."
     )
-    rollout: Literal["random", "kept"] | None = Field(
+    rollout: Literal["random", "repeat_last"] | None = Field(
         default=None,
         description="Of tree: how a beginning is completed, by random actions, or by keeping to the last one; none: "
         "random [-].",

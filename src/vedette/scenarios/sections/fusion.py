@@ -89,7 +89,7 @@ class Fusion(Section):
         description="Weight of each sensor, with sum 1; none: equal weights. Not used by sequential, parallel and "
         "central [-].",
     )
-    by_views: bool = Field(
+    field_of_view_weighting: bool = Field(
         default=False,
         description="Whether a sensor's weight at each label is in proportion to the odds with which it detects it, so "
         "that one that cannot see a target has no say in it (clmb, arithmetic_average) [-].",
@@ -131,8 +131,12 @@ class Fusion(Section):
 
     @check
     def _views_of_lmbs(self) -> Iterator[Finding]:
-        if self.by_views and self.kind not in LMB_FUSIONS:
-            yield ("by_views",), f"false, as {self.kind} does not weigh labels ({' and '.join(LMB_FUSIONS)} do)", "true"
+        if self.field_of_view_weighting and self.kind not in LMB_FUSIONS:
+            yield (
+                ("field_of_view_weighting",),
+                f"false, as {self.kind} does not weigh labels ({' and '.join(LMB_FUSIONS)} do)",
+                "true",
+            )
 
     @check
     def _matching_of_own_labels(self) -> Iterator[Finding]:
@@ -147,7 +151,7 @@ class Fusion(Section):
     @property
     def decides_in_full(self) -> bool:
         """True if joint decisions count every sensor's scans in full, for any reward."""
-        return self.kind in (*FULL_INFORMATION_FUSIONS, "arithmetic_average") or self.by_views
+        return self.kind in (*FULL_INFORMATION_FUSIONS, "arithmetic_average") or self.field_of_view_weighting
 
     def scaled_weights(self, num_sensors: int) -> tuple[float, ...]:
         """Return the weight of each sensor (default: equal), scaled to a sum of one beyond the rounding of the file."""
@@ -184,9 +188,9 @@ class Fusion(Section):
 
         weights, limits = self.scaled_weights(num_sensors), self.limits.build()
         if self.kind == "arithmetic_average":
-            return ArithmeticAverage(weights, self.by_views, limits)
+            return ArithmeticAverage(weights, self.field_of_view_weighting, limits)
         if self.kind == "clmb":
-            return Clmb(weights, self.mixture_power, self.missing_existence, limits, self.by_views)
+            return Clmb(weights, self.mixture_power, self.missing_existence, limits, self.field_of_view_weighting)
         return CmDeltaGlmb(weights, self.mixture_power, math.log(self.missing_weight), limits)
 
 

@@ -26,7 +26,7 @@ class NetworkSection(Part):
 
     @check
     def _consensus_is_at_once(self) -> Iterator[Finding]:
-        for name in ("hops", "delay"):
+        for name in ("max_hops", "delay"):
             if self.consensus_rounds is not None and getattr(self, name):
                 yield (name,), "none with consensus_rounds", describe(getattr(self, name))
 

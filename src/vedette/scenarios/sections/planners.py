@@ -50,9 +50,9 @@ class NamedJoint(ValuedStrategy):
 
 
 class NamedJointWithTruth(NamedJoint):
-    """Joint decisions on the true targets (`told`): the floor that strategies are compared with."""
+    """Joint decisions on the true targets (`true_targets`): the floor that strategies are compared with."""
 
-    kind: Literal["told"] = Field(default="told", description="Kind of planner [-].")  # type: ignore[assignment]
+    kind: Literal["true_targets"] = Field(default="true_targets", description="Kind of planner [-].")  # type: ignore[assignment]
 
     def incompatibility(self, model: ScenarioModel, *, labels: bool | None = None) -> str:
         """Return what is required instead, also if true targets are unknown or lack components of a custom motion."""
@@ -66,7 +66,7 @@ class NamedJointWithTruth(NamedJoint):
         """Return the joint planner on beliefs about the true targets, without undetected ones."""
         from vedette.simulation import TrueTargetsPlanner
 
-        settings = replace(parts.settings, undetected_worth=0.0)
+        settings = replace(parts.settings, undetected_target_value=0.0)
         joint = super().planner(parts._replace(settings=settings), folder)
         return TrueTargetsPlanner(joint, parts.sensors, parts.oracle["cutoff"], parts.estimate)
 
@@ -103,7 +103,7 @@ class NamedLookahead(LookaheadStrategy, Lookahead):
 
 _RULES = {
     "nearest": "each sensor to its nearest target",
-    "assigned": "sensor s to target s",
+    "assigned_target": "sensor s to target s",
     "centroid": "all sensors to the centroid of the targets",
 }
 
@@ -111,7 +111,7 @@ _RULES = {
 class NamedRule(Strategy):
     """Sensors that head for the estimated targets by a rule of thumb, as of the strategies of these names."""
 
-    kind: Literal["nearest", "assigned", "centroid"] = Field(
+    kind: Literal["nearest", "assigned_target", "centroid"] = Field(
         description="For each sensor its nearest target that none before it took; the s-th target for the s-th sensor; "
         "the middle of all targets [-]."
     )
@@ -121,7 +121,7 @@ class NamedRule(Strategy):
 
     @check
     def _targets_of_assigned(self) -> Iterator[Finding]:
-        if self.targets is not None and self.kind != "assigned":
+        if self.targets is not None and self.kind != "assigned_target":
             yield ("targets",), f"none, as the rule is {self.kind}", describe(list(self.targets))
 
     def description(self, model: ScenarioModel) -> str:
@@ -207,9 +207,9 @@ class _Fixed(Strategy):
         return "first course kept"
 
     def planner(self, parts: Parts, folder: Path) -> Planner:
-        from vedette.control import FixedPlanner
+        from vedette.control import ConstantPlanner
 
-        return with_reported_violations(FixedPlanner(parts.first_actions), parts)
+        return with_reported_violations(ConstantPlanner(parts.first_actions), parts)
 
 
 # The strategies of every scenario. Not validated: that would build the validators of rewards and searches at import.
@@ -218,13 +218,13 @@ STRATEGIES: dict[str, Strategy] = {
     "idm": NamedIndependent.model_construct(),
     "lookahead": LookaheadStrategy.model_construct(),
     "nearest": NamedRule(kind="nearest"),
-    "assigned": NamedRule(kind="assigned"),
+    "assigned_target": NamedRule(kind="assigned_target"),
     "centroid": NamedRule(kind="centroid"),
     "oracle": NamedOracle(),
-    "told": NamedJointWithTruth.model_construct(),
+    "true_targets": NamedJointWithTruth.model_construct(),
     "random": _Random(),
-    "fixed": _Fixed(),
-    "still": Strategy(),
+    "constant": _Fixed(),
+    "stationary": Strategy(),
 }
 
 

@@ -40,7 +40,7 @@ class _PlatformSection(Part):
 class Stationary(_PlatformSection):
     """Stays where it is."""
 
-    kind: Literal["still"] = Field(default="still", description="Kind of platform [-].")
+    kind: Literal["stationary"] = Field(default="stationary", description="Kind of platform [-].")
     of: ClassVar[str] = "vedette.platforms.steps:Stationary"
 
 
@@ -48,7 +48,7 @@ class Stationary(_PlatformSection):
 class Heading(_PlatformSection):
     """Turns at once, and keeps course and speed until the next decision; an action is a heading."""
 
-    kind: Literal["courses"] = Field(default="courses", description="Kind of platform [-].")
+    kind: Literal["heading"] = Field(default="heading", description="Kind of platform [-].")
     speed: Annotated[float, Field(ge=0.0)] | None = Field(default=None, description="Speed when under way [m/s].")
     speeds: Annotated[tuple[Annotated[float, Field(ge=0.0)], ...], Field(strict=False, min_length=1)] | None = Field(
         default=None, description="Instead of speed: several, of which an action chooses one [m/s]."
@@ -82,11 +82,11 @@ class Heading(_PlatformSection):
 class GridMoves(_PlatformSection):
     """Steps of one length, each made at a speed and followed by waiting; an action is a step."""
 
-    kind: Literal["steps"] = Field(default="steps", description="Kind of platform [-].")
+    kind: Literal["grid_moves"] = Field(default="grid_moves", description="Kind of platform [-].")
 
     def first_action(self, heading_deg: float) -> Row | None:
         """Return the step of length 0 if it may stay, else None."""
-        return (0.0, 0.0) if self.stay else None
+        return (0.0, 0.0) if self.allow_staying else None
 
 
 @derived("vedette.platforms.steps:Waypoints")
@@ -134,7 +134,7 @@ class Camera(_PlatformSection):
     pointing_deg: float = Field(default=0.0, description="Where it points at the start, as a heading [deg].")
     half_width_deg: HalfWidth = Field(description="Half the width of its field of view at the start [deg].")
     half_widths_deg: Annotated[tuple[HalfWidth, ...], Field(strict=False)]
-    carrier: Carrier = Field(default=Stationary(), description="What carries it [-].")
+    platform: Carrier = Field(default=Stationary(), description="What carries it [-].")
 
     def build(self, folder: Path | None = None, **_: Any) -> Platform:
         """Return a camera, with its carrier if that moves."""
@@ -142,7 +142,7 @@ class Camera(_PlatformSection):
 
         pointing: Platform = super().build(folder)
         return (
-            pointing if isinstance(self.carrier, Stationary) else MountedPlatform(self.carrier.build(folder), pointing)
+            pointing if isinstance(self.platform, Stationary) else MountedPlatform(self.platform.build(folder), pointing)
         )
 
     def components(self) -> Row:
@@ -151,14 +151,14 @@ class Camera(_PlatformSection):
 
     def first_action(self, heading_deg: float) -> Row | None:
         """Return the action that keeps its pointing."""
-        carried = () if isinstance(self.carrier, Stationary) else self.carrier.first_action(heading_deg)
+        carried = () if isinstance(self.platform, Stationary) else self.platform.first_action(heading_deg)
         zoom = (self.half_width_deg,) if self.half_widths_deg else ()
         return None if carried is None else (*carried, self.pointing_deg, *zoom)
 
     @property
     def top_speed(self) -> float:
         """Largest speed, m/s."""
-        return self.carrier.top_speed
+        return self.platform.top_speed
 
 
 if TYPE_CHECKING:

@@ -52,13 +52,13 @@ class RecordingSection(Section):
         description="From where bearings and headings count: north, clockwise (a compass), or east, counter-clockwise; "
         "none: as each sensor tells them (compass), or there are none [-].",
     )
-    gather: NonNegative = Field(
+    scan_window: NonNegative = Field(
         default=0.0, description="Rows of a sensor within this time after its first are one scan [s]."
     )
     turns: Literal["found", "none"] = Field(
         default="found",
         description="Whether a sensor without `turn` is taken for a turning radar where the bearings and times of its "
-        "rows show that it is one; a scan is then one turn, whatever `gather` says [-].",
+        "rows show that it is one; a scan is then one turn, whatever `scan_window` says [-].",
     )
     merge: NonNegative = Field(
         default=0.0,
@@ -103,7 +103,7 @@ def _read(
     from vedette.recorded.tables import read_table
 
     own = RecordingSection.model_validate_json(section)
-    conventions = Conventions(own.columns, own.units, own.bearings, own.gather, own.bad_rows)
+    conventions = Conventions(own.columns, own.units, own.bearings, own.scan_window, own.bad_rows)
     return parse_scans(read_table(file, sha256=own.sha256), sites, conventions, origin)
 
 

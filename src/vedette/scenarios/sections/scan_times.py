@@ -20,8 +20,8 @@ if TYPE_CHECKING:  # importing the models imports the compiler, which a check do
 class LateSection(Section):
     """Scans that come late, and are put in their places when they do."""
 
-    share: Probability = Field(default=1.0, description="Probability that a scan is late [-].")
-    up_to: Positive = Field(description="By how much, uniform from 0 [s].")
+    probability: Probability = Field(default=1.0, description="Probability that a scan is late [-].")
+    max_delay: Positive = Field(description="By how much, uniform from 0 [s].")
     start: float | None = Field(default=None, description="Scans taken before come at once; none: none does [s].")
     end: float | None = Field(default=None, description="Scans taken after it come at once; none: none does [s].")
     window: NonNegative | None = Field(
@@ -52,7 +52,7 @@ class ScanTimes(Section):
     offset: NonNegative | None = Field(
         default=None, description="Time of the first scan after the first step, instead of first [s]."
     )
-    drop_out: Share | None = Field(
+    scan_loss_probability: Share | None = Field(
         default=None,
         description="Probability that a scan does not take place, of which decisions know nothing; none: all do [-].",
     )

@@ -109,8 +109,8 @@ class ScenarioModel(Section):
     control: Control = Field(default=Control(), description="When and how the sensors decide [-].")
     planners: dict[Name, AnyPlanner] = Field(
         default={},
-        description="Further strategies by name, beside jdm, idm, lookahead, nearest, assigned, centroid, oracle, "
-        "told, random, fixed and still [-].",
+        description="Further strategies by name, beside jdm, idm, lookahead, nearest, assigned_target, centroid, "
+        "oracle, true_targets, random, constant and stationary [-].",
     )
     ospa: Ospa = Field(default=Ospa(), description="How the estimates are scored [-].")
     metrics: dict[Name, AnyMetric] = Field(

@@ -65,7 +65,7 @@ class MarginalEstimator(Section):
 class TrackedFraction(Part):
     """At each scan, the share of the targets seen by some sensor that have an estimate within the cutoff of `ospa`."""
 
-    kind: Literal["tracked_share"] = Field(default="tracked_share", description="Kind of measure [-].")
+    kind: Literal["tracked_fraction"] = Field(default="tracked_fraction", description="Kind of measure [-].")
 
 
 @derived("vedette.evaluation.metrics.time_to_track:TimeToTrack", without=("cutoff", "order"))
@@ -98,15 +98,17 @@ class Ospa(Section):
         "positions in the plane [-].",
     )
     window: Count = Field(default=10, description="Scans of the window of OSPA(2) [-].")
-    from_step: Count | None = Field(
+    first_scan: Count | None = Field(
         default=None, description="First scan of the reported mean; none: the one after the first decision, or 1 [-]."
     )
-    to_step: Count | None = Field(default=None, description="Last scan of the reported mean; none: the last scan [-].")
+    last_scan: Count | None = Field(
+        default=None, description="Last scan of the reported mean; none: the last scan [-]."
+    )
 
     @check
     def _in_order(self) -> Iterator[Finding]:
-        if self.from_step is not None and self.to_step is not None and self.to_step < self.from_step:
-            yield ("to_step",), f"a step from from_step, {self.from_step}, on", describe(self.to_step)
+        if self.first_scan is not None and self.last_scan is not None and self.last_scan < self.first_scan:
+            yield ("last_scan",), f"a scan from first_scan, {self.first_scan}, on", describe(self.last_scan)
 
     @property
     def unit(self) -> str:

@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING
 
 from pydantic import Field, create_model
 
@@ -104,7 +104,7 @@ class Sensor(Section):
     height: float = Field(
         default=0.0, description="Above the plane, for measurements that depend on the heights of targets [m]."
     )
-    platform: AnyPlatform = Field(default=of_kind("still"), description="What carries it: what it may do [-].")
+    platform: AnyPlatform = Field(default=of_kind("stationary"), description="What carries it: what it may do [-].")
     price: float | str | None = Field(
         default=None,
         description="What each of its actions costs, in units of the reward, which planners subtract; or, of a custom "
@@ -119,10 +119,10 @@ class Sensor(Section):
     budget: Budget | None = Field(
         default=None, description="Of scanning time, from the first decision on; none: without limit [-]."
     )
-    moves_from: Literal["first_decision", "start"] = Field(
-        default="first_decision",
-        description="Whether it lies still until its first decision, as in the paper, or is under way on its course, "
-        "or under the first of its actions [-].",
+    stationary_until_first_decision: bool = Field(
+        default=True,
+        description="Whether it is stationary until its first decision, as in the paper; otherwise it moves on its "
+        "course, or by the first of its actions, from the first scan on [-].",
     )
     measurement: Measurement = Field(default=of_kind("bearing_range"), description="What it measures [-].")
     compass: bool = Field(
@@ -151,15 +151,19 @@ class Sensor(Section):
         default=BiasSection(),
         description="What its scans say too much, taken off before filters see them; `vedette calibrate` finds it [-].",
     )
-    truth: TrueSensor | None = Field(
+    true_parameters: TrueSensor | None = Field(
         default=None,
-        description="What it is in truth, where the filters' model of it differs [-].",
+        description="Its true models and bias, where they differ from those that the filters use [-].",
     )
     scans: ScanTimes = Field(default=ScanTimes(), description="Steps at which it scans [-].")
 
     @check
     def _a_camera_carries_a_camera(self) -> Iterator[Finding]:
-        true = () if self.truth is None else (self.truth.detection, self.truth.first_detection)
+        true = (
+            ()
+            if self.true_parameters is None
+            else (self.true_parameters.detection, self.true_parameters.first_detection)
+        )
         kinds = [section.kind for section in (self.detection, *true) if section is not None]
         if "camera" in kinds and len(self.platform.components()) < 2:
             yield ("platform",), "a camera, as its detection is a camera's", self.platform.kind
@@ -209,9 +213,9 @@ class Sensor(Section):
             yield ("bias", *path), wanted, came
 
     @check
-    def _truth_is_of_one_kind_with_the_model(self) -> Iterator[Finding]:
-        if self.truth is not None:
-            yield from self.truth.findings_beside(self.measurement)
+    def _true_parameters_fit_the_model(self) -> Iterator[Finding]:
+        if self.true_parameters is not None:
+            yield from self.true_parameters.findings_beside(self.measurement)
 
     @property
     def pose(self) -> tuple[float, ...]:
@@ -253,9 +257,9 @@ class Sensor(Section):
         """Return the true sensor for the model in the filters; raises like `build`."""
         from vedette.simulation.true_sensors import TrueSensor as Made
 
-        if self.truth is None:
+        if self.true_parameters is None:
             return Made(known)
-        made = self.truth.build(known, self.measurement, self.bias, region, folder)
+        made = self.true_parameters.build(known, self.measurement, self.bias, region, folder)
         # The bias of a compass is clockwise; simulated bearings are from the east.
         return replace(made, bias=replace(made.bias, bearing=-made.bias.bearing)) if self.compass else made
 

@@ -82,7 +82,9 @@ class ValuedStrategy(Strategy):
         kind = model.filter.kind
         if kind not in UNLABELLED if labels is None else labels:
             return ""
-        return f"nearest, assigned, centroid, oracle or custom, as {kind} filters have no labels ({LABELLING} do)"
+        return (
+            f"nearest, assigned_target, centroid, oracle or custom, as {kind} filters have no labels ({LABELLING} do)"
+        )
 
     def by_reward(self, decisions: str, model: ScenarioModel) -> str:
         """Return the description of decisions with their reward."""

@@ -249,7 +249,7 @@ class UniformTargets(Section):
     Births make up for deaths; where a target leaves the region another enters at the opposite edge.
     """
 
-    kind: Literal["crowd"] = Field(default="crowd", description="Kind of targets [-].")
+    kind: Literal["uniform"] = Field(default="uniform", description="Kind of targets [-].")
     number: Annotated[int, Field(ge=1, le=1_000_000)] = Field(
         description="Number of targets at the first scan, and on average later [-]."
     )

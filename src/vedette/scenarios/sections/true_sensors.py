@@ -100,19 +100,19 @@ class TrueSensor(Section):
     def findings_beside(self, known: Measurement) -> Iterator[Finding]:
         """Yield faults of the true sensor for the measurement that the filters assume."""
         if self.measurement is not None:
-            yield from same_measurement_findings(self.measurement, known, ("truth", "measurement"))
+            yield from same_measurement_findings(self.measurement, known, ("true_parameters", "measurement"))
         if self.bias is not None:
             for path, wanted, came in self.bias.findings_beside(known):
-                yield ("truth", "bias", *path), wanted, came
+                yield ("true_parameters", "bias", *path), wanted, came
         measurement = self._like(known)
         if self.noise is not None:
-            yield from noise_findings(measurement, self.noise, ("truth", "noise"))
+            yield from noise_findings(measurement, self.noise, ("true_parameters", "noise"))
         if self.clutter is not None:
-            yield from clutter_findings(measurement, self.clutter, ("truth", "clutter"))
-            yield from clutter_box_findings(measurement, self.clutter, ("truth", "clutter"))
+            yield from clutter_findings(measurement, self.clutter, ("true_parameters", "clutter"))
+            yield from clutter_box_findings(measurement, self.clutter, ("true_parameters", "clutter"))
         if self.detection_of == "measurement" and measurement.kind not in (*PLACED, "custom"):
             wanted = f"state, as a {measurement.kind} measurement does not say where the target is"
-            yield ("truth", "detection_of"), wanted, describe(self.detection_of)
+            yield ("true_parameters", "detection_of"), wanted, describe(self.detection_of)
 
     def _like(self, known: Measurement) -> Measurement:
         """Return the measurement for noise and clutter: the filters' or, in place of a custom one, the true one."""

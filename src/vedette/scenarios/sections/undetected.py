@@ -28,11 +28,11 @@ _LEAST_CELLS, _MOST_CELLS, _CELLS_A_REACH = 16, 64, 2.0
 _PRIOR_PER_SCAN = 0.1  # births per scan if their rate is learnt and no prior is given
 
 
-@derived("vedette.models.undetected:UndetectedModel", first=("cell",))
+@derived("vedette.models.undetected:UndetectedModel", first=("cell_size",))
 class UndetectedSection(Derived):
     """How many targets there are that no sensor has found yet, on a grid: some at first, others that appear later."""
 
-    cell: Positive = Field(description="Side of a cell, at most [m].")
+    cell_size: Positive = Field(description="Side of a cell, at most [m].")
     expected: float = Field(ge=0.0, description="Mean number of them at the first scan, spread evenly [-].")
     speed: float = Field(
         ge=0.0,
@@ -62,7 +62,7 @@ class UndetectedSection(Derived):
         """Return the model; region: of the scenario, used if the section has none."""
         from vedette.models import CellGrid, UndetectedModel
 
-        grid = CellGrid.covering((self.region or region).build(), self.cell)
+        grid = CellGrid.covering((self.region or region).build(), self.cell_size)
         return UndetectedModel(
             grid, **{name: value for name, value in self.to_arguments().items() if value is not None}
         )
@@ -106,7 +106,7 @@ def searches_by_default(model: ScenarioModel) -> bool:
     """Return True if planners search for undetected targets without a section that gives their number."""
     if model.undetected is not None or not _may_be_found(model):
         return False
-    return bool(model.decision_steps) and model.control.undetected_worth != 0.0
+    return bool(model.decision_steps) and model.control.undetected_target_value != 0.0
 
 
 def _may_be_found(model: ScenarioModel) -> bool:
@@ -152,20 +152,20 @@ def cells_of_undetected(model: ScenarioModel) -> Iterator[Finding]:
     """Yield faults of too many cells, and of a worth of undetected targets without an intensity of them."""
     section = model.undetected
     if section is None:
-        worth = model.control.undetected_worth
+        worth = model.control.undetected_target_value
         if worth and not _may_be_found(model):
             wanted = "0, or a section `undetected`, which says where such targets may be"
-            yield ("control", "undetected_worth"), wanted, describe(worth)
+            yield ("control", "undetected_target_value"), wanted, describe(worth)
         return
     region = section.region or model.region
     width, height = region.x_max - region.x_min, region.y_max - region.y_min
     if min(width, height) <= 0.0:
         return
-    if max(math.ceil(width / section.cell), 1) * max(math.ceil(height / section.cell), 1) > MAX_CELLS:
+    if max(math.ceil(width / section.cell_size), 1) * max(math.ceil(height / section.cell_size), 1) > MAX_CELLS:
         wanted = (
             f"at least {_sufficient_cell_size(width, height):.3g}, as at most {MAX_CELLS:,} cells may fill the region"
         )
-        yield ("undetected", "cell"), wanted, describe(section.cell)
+        yield ("undetected", "cell_size"), wanted, describe(section.cell_size)
 
 
 def _sufficient_cell_size(width: float, height: float) -> float:
