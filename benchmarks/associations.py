@@ -56,7 +56,7 @@ def main() -> None:
                 seconds.append(time.process_time() - start)
             print(
                 f"{num:6d}  {side:6.0f}  {type(assignment).__name__:18s}  {1e3 * min(seconds):7.1f}"
-                f"  {posterior.existence.sum():9.1f}  {info.log_likelihood:14.1f}  {info.discarded_weight_bound:17.3f}"
+                f"  {posterior.existence.sum():9.1f}  {info.log_likelihood:14.1f}  {info.truncation_error_bound:17.3f}"
             )
 
 

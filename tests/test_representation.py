@@ -113,7 +113,9 @@ def test_what_is_read_and_resolved_is_told_in_two_lines() -> None:
     assert len(second) <= WIDEST + 2
     axes = 'scenarios = ["paper-e", "linear-10"]\nplanners = ["stationary", "idm"]\nruns = 3\n'
     campaign = resolve(parse_spec(f'name = "trial"\n{axes}'))
-    assert repr(campaign) == "Campaign trial: 4 cells, 12 runs\n  scenario: paper-e, linear-10; planner: still, idm"
+    assert (
+        repr(campaign) == "Campaign trial: 4 cells, 12 runs\n  scenario: paper-e, linear-10; planner: stationary, idm"
+    )
     assert "<br>scenario: paper-e, linear-10" in campaign._repr_html_()
 
 

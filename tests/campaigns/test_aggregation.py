@@ -150,7 +150,7 @@ def test_runs_of_other_scenarios_and_times_are_refused() -> None:
 
 def test_health_adds_up_whatever_the_parts() -> None:
     healths = [make_record("jdm", run).health for run in range(5)]
-    healths[3].discarded_weight_bound[:] = np.nan
+    healths[3].truncation_error_bound[:] = np.nan
     whole, parts = health_sums(healths), add_health_sums([health_sums(healths[:3]), health_sums(healths[3:])])
     for mine, theirs in zip(whole, parts, strict=True):
         np.testing.assert_allclose(np.asarray(mine), np.asarray(theirs), rtol=1e-13)

@@ -83,7 +83,7 @@ def test_arrow_alone_reads_a_payload():
 
 def test_the_layout_of_this_version_is_as_written_here():
     """Where this fails, results of earlier versions no longer read: raise FORMAT_VERSION with the change."""
-    assert FORMAT_VERSION == 6
+    assert FORMAT_VERSION == 7
     assert {
         name: " ".join((*layout.fixed, *(f"{start}*" for start in layout.more))) for name, layout in LAYOUTS.items()
     } == {
@@ -93,8 +93,9 @@ def test_the_layout_of_this_version_is_as_written_here():
         "truth": "step time_s target state_*",
         "tracks": "step time_s birth_step birth_site existence mean_* cov_*",
         "sensors": "step time_s sensor x_m y_m heading_rad log_likelihood num_hypotheses num_tracks "
-        "discarded_weight_bound dropped_existence num_clutter_raised num_duplicates num_inexact_clusters search_cut "
-        "cap_met factoring_error num_missing_sets num_missing_labels bytes_sent pose_* off*",
+        "truncation_error_bound dropped_existence num_clutter_floored num_duplicates num_inexact_clusters "
+        "search_truncated limit_reached independence_error_bound num_missing_sets num_missing_labels "
+        "bytes_sent pose_* off*",
         "decisions": "decision step time_s planner notes num_*",
         "actions": "decision step time_s sensor action chosen *",
         "rewards": "decision step time_s reward_table reward reward_se chosen action_*",
@@ -104,9 +105,9 @@ def test_the_layout_of_this_version_is_as_written_here():
     } == {
         "own_rewards": "decision step time_s reward_table sensor action reward reward_se chosen",
         "explanations": "decision step time_s reward reward_se baseline undetected_gain evaluations bound bound_kind "
-        "bound_unbounded runner_up margin margin_se missing price* action_*",
+        "num_targets_without_bound runner_up margin margin_se missing price* action_*",
         "target_gains": "decision step time_s birth_step birth_site existence_gain localisation_gain",
-        "sensor_gains": "decision step time_s sensor gain without",
+        "sensor_gains": "decision step time_s sensor gain reward_without_sensor",
         "undetected": "decision step time_s x_min_m x_max_m y_min_m y_max_m columns rows cell_*",
     }
 

@@ -42,15 +42,15 @@ def test_a_failed_run_says_where_it_stopped_until_it_is_done(broken: pytest.Monk
     campaign, folder = small_campaign(runs=2), tmp_path / "results"
     (failed,) = run_campaign(campaign, folder).failed
     message = (
-        "paper-a, still, seed 0, run 1: stopped at step 7 of 12 (7 s), in the filter of sensor 1: no hypothesis has "
-        "positive weight"
+        "paper-a, stationary, seed 0, run 1: stopped at step 7 of 12 (7 s), in the filter of sensor 1: no "
+        "hypothesis has positive weight"
     )
     assert (failed.cell, failed.run, failed.message) == ("stationary", 1, message)
     results = open_results(folder)
     assert results.failures() == (Failure("stationary", 1, 1, message),)
     assert results.missing("stationary") == (1,)
     told = CliRunner().invoke(app, ["results", str(folder)])
-    assert f"failed: 1 run; the same command tries again:\n  cell still, run 1: {message}" in told.stdout
+    assert f"failed: 1 run; the same command tries again:\n  cell stationary, run 1: {message}" in told.stdout
     write_report(results, tmp_path / "report.html")
     page = (tmp_path / "report.html").read_text("utf-8")
     assert "1 run failed." in page

@@ -169,7 +169,7 @@ def test_shares_of_another_scenario_or_version_are_refused(tmp_path: Path, monke
     campaign = make_campaign()
     fill(tmp_path / "one", campaign)
     with monkeypatch.context() as patch:
-        patch.setattr("vedette.campaigns.cells._contents", lambda scenario: ["other bytes"])
+        patch.setattr("vedette.campaigns.cells.contents_of", lambda scenario: ["other bytes"])
         fill(tmp_path / "changed", campaign)
     with pytest.raises(InputError, match=r"changed: .*files that its scenarios name have other contents"):
         merge([tmp_path / "one", tmp_path / "changed"], tmp_path / "merged")

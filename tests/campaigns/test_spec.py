@@ -68,14 +68,14 @@ def test_variants_hold_settings_that_belong_together() -> None:
         set = {"filter.kind" = "lmb", "fusion.kind" = "clmb"}
         """.replace("        ", "")
     )
-    assert [cell.name for cell in variants.cells] == ["still-GLMB", "still-LMB_CLMB"]
+    assert [cell.name for cell in variants.cells] == ["stationary-GLMB", "stationary-LMB_CLMB"]
     assert variants.compare == "variant"
     assert [cell.scenario.model.filter.kind for cell in variants.cells] == ["delta_glmb", "lmb"]
 
 
 def test_a_central_filter_is_compared_with_fusions() -> None:
     both = campaign('planners = ["stationary"]\nfusions = ["cm_delta_glmb", "central"]\n')
-    assert [cell.name for cell in both.cells] == ["still-cm_delta_glmb", "still-central"]
+    assert [cell.name for cell in both.cells] == ["stationary-cm_delta_glmb", "stationary-central"]
     assert both.compare == "fusion"
 
 
@@ -87,7 +87,7 @@ def test_scenarios_are_named_or_lie_beside_the_file(tmp_path: Path) -> None:
         'name = "x"\nscenarios = ["scene.yaml", "paper-a"]\nruns = 1\nplanners = ["stationary"]'
     )
     beside = resolve(load_spec(folder / "spec.toml"), folder)
-    assert [cell.name for cell in beside.cells] == ["scene-still", "paper-a-still"]
+    assert [cell.name for cell in beside.cells] == ["scene-stationary", "paper-a-stationary"]
     with pytest.raises(
         InputError, match=r"scenarios\.0: .*absent\.yaml: no such file; expected a YAML file or one of "
     ):

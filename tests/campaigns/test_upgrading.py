@@ -23,12 +23,14 @@ from vedette.campaigns.upgrading import upgrade_results
 from vedette.cli import app
 from vedette.errors import InputError
 from vedette.evaluation.diagnostics import diagnostics_line, run_diagnostics
+from vedette.scenarios import load_scenario
 from vedette.simulation.arrow import Layout, read_table
+from vedette.simulation.serialization import FORMER_COLUMNS
 from vedette.simulation.storage import load_run
 from vedette.simulation.tables import LAYOUTS
 
-FORMATS = (5,)
-COLUMN = "factoring_error"
+FORMATS = (5, 6)
+COLUMN = "independence_error_bound"
 TABLE = "sensors.arrow"
 
 
@@ -60,15 +62,15 @@ def dumped(folder: Path) -> list[Any]:
 
 def sensors_before(folder: Path) -> dict[str, Any]:
     """The sensors' table of a saved run of format 5."""
-    layout = LAYOUTS["sensors"]
-    had = Layout({name: kind for name, kind in layout.fixed.items() if name != COLUMN}, layout.more)
+    layout, former = LAYOUTS["sensors"], FORMER_COLUMNS["sensors"]
+    had = Layout({former.get(name, name): kind for name, kind in layout.fixed.items() if name != COLUMN}, layout.more)
     return dict(read_table((folder / TABLE).read_bytes(), had, TABLE))
 
 
 @pytest.mark.parametrize("number", FORMATS)
 def test_every_format_is_read_after_an_upgrade(number: int, tmp_path: Path) -> None:
     folder = fixture(number, "campaign", tmp_path)
-    with pytest.raises(InputError, match=rf"expected format 6; got {number}, .*`vedette upgrade \S+campaign` brings"):
+    with pytest.raises(InputError, match=rf"expected format 7; got {number}, .*`vedette upgrade \S+campaign` brings"):
         open_results(folder)
     assert upgrade_results(folder) == number
     results = open_results(folder)
@@ -80,7 +82,7 @@ def test_every_format_is_read_after_an_upgrade(number: int, tmp_path: Path) -> N
     with pytest.raises(InputError, match="vedette upgrade"):
         load_run(saved)
     assert upgrade_results(saved) == number
-    assert load_run(saved).planner == "random"
+    assert load_run(saved).planner == {5: "random", 6: "jdm"}[number]
 
 
 def test_nothing_is_lost_and_what_was_not_known_is_not(campaign: Path, run: Path) -> None:
@@ -89,13 +91,17 @@ def test_nothing_is_lost_and_what_was_not_known_is_not(campaign: Path, run: Path
     (run / "figures" / "mine.txt").write_text("kept")
     upgrade_results(run)
     record = load_run(run)
-    assert np.isnan(record.health.factoring_error).all()
+    assert np.isnan(record.health.independence_error_bound).all()
     assert "independence error: not known" in diagnostics_line(run_diagnostics(record.health))
-    for name in ("discarded_weight_bound", "num_tracks", "log_likelihood"):
-        np.testing.assert_array_equal(getattr(record.health, name).ravel(), before[name])
+    for name, former in (("truncation_error_bound", "discarded_weight_bound"), ("num_tracks", "num_tracks")):
+        np.testing.assert_array_equal(getattr(record.health, name).ravel(), before[former])
     after = contents(run)
     assert after.pop("figures/mine.txt") == b"kept"
-    assert {name for name, content in after.items() if others[name] != content} == {TABLE, "manifest.json"}
+    assert {name for name, content in after.items() if others[name] != content} == {
+        TABLE,
+        "scenario.yaml",
+        "manifest.json",
+    }
     # The campaign's run of the same seed and strategy is the same, but for the clock.
     upgrade_results(campaign)
     twin = open_results(campaign).record("random", 0)
@@ -103,11 +109,32 @@ def test_nothing_is_lost_and_what_was_not_known_is_not(campaign: Path, run: Path
     np.testing.assert_array_equal(twin.health.num_hypotheses, record.health.num_hypotheses)
 
 
+def test_former_names_are_replaced_everywhere(tmp_path: Path) -> None:
+    """In the specification, the scenarios, the settings, the tables and the names of strategies."""
+    folder, saved = fixture(6, "campaign", tmp_path), fixture(6, "run", tmp_path)
+    before = json.loads((folder / "manifest.json").read_text())
+    for each in (folder, saved):
+        upgrade_results(each)
+    results, record = open_results(folder), load_run(saved)
+    fixed = results.campaign.cell("fixed")
+    assert (fixed.planner, results.record("fixed", 0).planner) == ("constant", "constant")
+    assert results.campaign.axes["sensors.*.stationary_until_first_decision"] == (True,)
+    assert results.campaign.spec["set"]["ospa.last_scan"] == 5
+    assert fixed.scenario.model.sensors[0].platform.kind == "heading"
+    assert load_scenario(saved / "scenario.yaml").model == results.campaign.cells[0].scenario.model
+    assert results.manifest["digest"] == results.campaign.digest() != before["digest"]
+    why, twin = (each.decisions[0].plan.explanation for each in (record, results.record("jdm", 0)))
+    assert why is not None
+    assert twin is not None
+    np.testing.assert_array_equal(why.reward_without_sensor, twin.reward_without_sensor)
+    assert not np.isnan(record.health.independence_error_bound).any()
+
+
 def test_a_second_time_changes_nothing(campaign: Path, run: Path) -> None:
     for folder in (campaign, run):
         upgrade_results(folder)
         before = contents(folder)
-        assert upgrade_results(folder) == 6
+        assert upgrade_results(folder) == 7
         assert contents(folder) == before
 
 
@@ -177,9 +204,9 @@ def test_a_run_that_is_killed_at_any_time_is_ended_by_the_same_command(
 @pytest.mark.parametrize(
     ("number", "message"),
     [
-        (7, "expected format 6; got 7, written by a later version"),
-        (4, "expected format 6; got 4, written by an earlier version of this program: run it again, or read it with"),
-        (True, "expected format 6; got True, written by another version"),
+        (8, "expected format 7; got 8, written by a later version"),
+        (4, "expected format 7; got 4, written by an earlier version of this program: run it again, or read it with"),
+        (True, "expected format 7; got True, written by another version"),
         ("5", "written by another version"),
         (None, "got None"),
         ([5], "written by another version"),
@@ -234,11 +261,11 @@ def test_the_command_says_what_it_did(campaign: Path) -> None:
     (campaign / "tables").mkdir()
     done = runner.invoke(app, ["upgrade", str(campaign)])
     assert (done.exit_code, done.stderr) == (0, "")
-    assert done.stdout.splitlines()[0] == f"{campaign}: format 5 is now 6"
+    assert done.stdout.splitlines()[0] == f"{campaign}: format 5 is now 7"
     assert f"vedette results {campaign} --export" in done.stdout
     again = runner.invoke(app, ["upgrade", str(campaign)])
-    assert again.stdout == f"{campaign}: format 6, which this version reads; nothing was changed\n"
+    assert again.stdout == f"{campaign}: format 7, which this version reads; nothing was changed\n"
     refused = runner.invoke(app, ["upgrade", str(campaign / "nowhere")])
     assert (refused.exit_code, refused.stdout) == (1, "")
     assert runner.invoke(app, ["results", str(campaign)]).exit_code == 0
-    assert math.isnan(open_results(campaign).record("jdm", 0).health.factoring_error[0, 0])
+    assert math.isnan(open_results(campaign).record("jdm", 0).health.independence_error_bound[0, 0])

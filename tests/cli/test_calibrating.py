@@ -70,7 +70,7 @@ def test_a_search_that_did_not_converge_has_no_intervals(place: Path, monkeypatc
     assert result.exit_code == 3, result.output
     told = json.loads(result.stdout)
     assert told["converged"] is False
-    assert {row["low"] for row in told["parameters"]} == {row["high"] for row in told["parameters"]} == {None}
+    assert {row["ci_low"] for row in told["parameters"]} == {row["ci_high"] for row in told["parameters"]} == {None}
 
 
 def test_existing_files_are_not_overwritten_without_the_option(place: Path) -> None:

@@ -75,7 +75,7 @@ CALLS: list[tuple[tuple[str, ...], set[str]]] = [
     (("campaign", "spec.toml", "--workers", "1", "--shard", "2/2"), {"folder", "finished", "failed"}),
     (("merge", "trial-shards", "--out", "merged"), {"folder", "runs", "finished", "missing_shards", "commands"}),
     (("results", "trial-results", "--export", "tables", "--tex", "table.tex"), {"comparisons", "missing", "written"}),
-    (("upgrade", "trial-results"), {"folder", "format_was", "format"}),
+    (("upgrade", "trial-results"), {"folder", "previous_format", "format"}),
     (("report", "trial-results"), {"page", "figures"}),
     (("demo", "short.yaml", "--planners", "still,own", "--workers", "1"), {"comparisons", "page"}),
     (
@@ -119,7 +119,7 @@ def test_documents_have_the_numbers_unrounded(place: Path) -> None:
     assert call("campaign", "spec.toml", "--workers", "1").exit_code == 0
     (group,) = json.loads(call("results", "trial-results", "--json").stdout)["comparisons"]
     assert [each["strategy"] for each in group["strategies"]] == ["stationary", "own"]
-    assert all(f"{each['total_mean_m']:.2f}" in call("results", "trial-results").stdout for each in group["strategies"])
+    assert all(f"{each['ospa_mean_m']:.2f}" in call("results", "trial-results").stdout for each in group["strategies"])
 
 
 def test_errors_are_in_the_json_and_printed_when_quiet(place: Path) -> None:

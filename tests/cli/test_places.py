@@ -54,7 +54,7 @@ def test_output_does_not_replace_a_file_of_another_kind(place: Path, words: str,
 def test_a_run_does_not_replace_a_campaign(tmp_path: Path) -> None:
     campaign = tmp_path / "results"
     campaign.mkdir()
-    (campaign / "manifest.json").write_text('{"format": "vedette-campaign", "format_version": 6}')
+    (campaign / "manifest.json").write_text('{"format": "vedette-campaign", "format_version": 7}')
     with pytest.raises(InputError, match=r"expected a folder that holds a run; .*results holds something else"):
         check_target(campaign, overwrite=True)
 

@@ -29,7 +29,7 @@ def test_the_page_and_the_figures_are_written_where_they_should_be(folder: Path,
     names = sorted(path.name for path in figures.iterdir())
     assert f"wrote {page}" in result.stdout
     assert f"wrote {len(names)} files to {figures}" in result.stdout
-    for stem in ("ospa", "distributions", "decisions", "cost", "consistency", "tracks-fixed"):
+    for stem in ("ospa", "distributions", "decisions", "cost", "consistency", "tracks-constant"):
         assert {f"{stem}.pdf", f"{stem}.png", f"{stem}.svg"} <= set(names)
     assert "Fixed, run" in page.read_text("utf-8")
 
@@ -49,7 +49,7 @@ def test_the_page_is_in_the_folder_by_default_and_shows_the_chosen_runs(folder: 
         ("fixed:x", 2, "got 'fixed:x'"),
         ("fixed:0,", 2, "got ''"),
         ("fixed:7", 1, "--runs: expected a finished run of cell fixed (0 to 1); got 7"),
-        ("gone:0", 1, "--runs: expected one of fixed, still; got 'gone'"),
+        ("gone:0", 1, "--runs: expected one of constant, stationary; got 'gone'"),
     ],
 )
 def test_invalid_runs_are_named(folder: Path, tmp_path: Path, runs: str, status: int, message: str) -> None:

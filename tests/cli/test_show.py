@@ -35,7 +35,7 @@ def test_the_tables_have_the_numbers() -> None:
     text = show("paper-a").stdout
     for line in (
         "scans 40, every 1 s from 1 to 40 s",
-        "sensor 1 -745 830 0 courses",
+        "sensor 1 -745 830 0 heading",
         "decisions after scans 10, 20, 30",
         "sensors move from the first decision on",
         "clutter region, rate 25",
@@ -136,6 +136,6 @@ def test_zones_biases_and_late_scans_are_described_briefly() -> None:
     lines = " ".join(show("solent-patrol").stdout.split())
     assert "constraint keep out, polygon of 21 corners" in lines
     assert "constraint stay inside, x -3000 to 3000 m, y -3000 to 3000 m" in lines
-    assert "boat 2: late share 0.8, up to 30 s, start 600 s, end 1200 s" in lines
+    assert "boat 2: late probability 0.8, max delay 30 s, start 600 s, end 1200 s" in lines
     assert "origin lon -1.1171 deg, lat 50.7865 deg" in lines
     assert "process noise 0.15 m/s^1.5, noise model continuous white" in lines

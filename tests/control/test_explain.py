@@ -93,7 +93,11 @@ def test_contributions_add_up_and_are_what_joint_actions_say(reward: Any) -> Non
             shares[s] += 0.5 * (value[tuple(scanning)] - before)
     near(why.baseline, value[False, False, False], why.reward)
     near(why.of_sensors, shares, why.reward)
-    near(why.without, [value[False, True, True], value[True, False, True], value[True, True, False]], why.reward)
+    near(
+        why.reward_without_sensor,
+        [value[False, True, True], value[True, False, True], value[True, True, False]],
+        why.reward,
+    )
     assert why.of_sensors is not None
     near(why.baseline + why.of_sensors.sum(), why.reward, why.reward)
     if isinstance(reward, PeecsReward):
@@ -247,7 +251,7 @@ def test_an_independent_decision_is_the_sum_of_the_sensors_own() -> None:
     alone = np.array([values[action] - values[3] for values, action in zip(own, plan.chosen, strict=True)])
     near(why.reward, sum(reward for reward, _ in plan.expected_rewards), 1.0)
     near(why.of_sensors, alone, 1.0)
-    near(why.without, why.reward - alone, 1.0)
+    near(why.reward_without_sensor, why.reward - alone, 1.0)
     near(why.baseline + why.of_targets.total.sum(), why.reward, 1.0)  # type: ignore[union-attr]
     margins = [np.sort(values[:3])[-1] - np.sort(values[:3])[-2] for values in own]
     assert why.runner_up is not None
@@ -264,7 +268,7 @@ def test_decisions_case_by_case_say_what_they_cannot_tell(kind: str, planner: An
     example = situation(kind, 2, 1, SETTINGS)
     plan = decided(example, planner, CauchySchwarzReward(), seed=2)
     why = plan.explain()
-    assert [why.of_targets, why.of_sensors, why.without, why.baseline] == [None] * 4
+    assert [why.of_targets, why.of_sensors, why.reward_without_sensor, why.baseline] == [None] * 4
     assert "case by case" in why.missing["without"]
     assert why.runner_up is not None
     had = why.counterfactual(0, why.runner_up.actions[0])
@@ -315,6 +319,6 @@ def test_threads_change_no_explanation() -> None:
     assert one.of_targets is not None
     assert three.of_targets is not None
     np.testing.assert_array_equal(one.of_sensors, three.of_sensors)
-    np.testing.assert_array_equal(one.without, three.without)
+    np.testing.assert_array_equal(one.reward_without_sensor, three.reward_without_sensor)
     np.testing.assert_array_equal(one.of_targets.existence, three.of_targets.existence)
     assert str(one) == str(three)

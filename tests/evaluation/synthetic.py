@@ -101,7 +101,7 @@ def _move(planner: str, times: Floats, rng: np.random.Generator) -> tuple[Floats
 def _health(num_scans: int, rng: np.random.Generator) -> Health:
     """Two sensors that cut off a little at every scan, and a label that the second lacks at every fourth."""
     health = Health.unreported(num_scans, 2)
-    health.discarded_weight_bound[:] = rng.uniform(0.0, 1e-3, (num_scans, 2))
+    health.truncation_error_bound[:] = rng.uniform(0.0, 1e-3, (num_scans, 2))
     health.log_likelihood[0] = np.nan
     health.num_hypotheses[:] = rng.integers(1, 300, (num_scans, 2))
     health.fusion_num_sets[:] = 10

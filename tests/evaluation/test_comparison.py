@@ -64,9 +64,9 @@ def of_these(comparison: Comparison, *places: int) -> Comparison:
 def test_significance_is_corrected_for_the_number_of_strategies(comparison: Comparison) -> None:
     alone = [comparison.difference(name).p_value for name in STRATEGIES[1:]]
     np.testing.assert_array_equal(comparison.p_values(), [np.nan, *holm(np.array(alone))])
-    assert significance(comparison) == "Significant at 5 % (Holm correction): random, fixed; not significant: idm."
+    assert significance(comparison) == "Significant at 5 % (Holm correction): random, constant; not significant: idm."
     alike = of_these(comparison, 0, 2, 3, 0)
-    assert significance(alike) == "Significant at 5 % (Holm correction): idm, random; not significant: fixed."
+    assert significance(alike) == "Significant at 5 % (Holm correction): idm, random; not significant: constant."
     assert (
         significance(of_these(comparison, 0, 2, 3, 3)) == "All 3 differences are significant at 5 % (Holm correction)."
     )
@@ -120,7 +120,7 @@ def test_an_empty_time_window_is_rejected(runs: dict[str, list[RunRecord]]) -> N
 
 
 def test_unknown_strategy_is_named(comparison: Comparison) -> None:
-    with pytest.raises(InputError, match="expected one of jdm, idm, random, fixed; got 'greedy'"):
+    with pytest.raises(InputError, match="expected one of jdm, idm, random, constant; got 'greedy'"):
         comparison.summary("greedy")
 
 
@@ -198,8 +198,8 @@ def test_benchmarks_show_tails_next_to_means() -> None:
 
 def test_csv_holds_the_unrounded_numbers(comparison: Comparison) -> None:
     rows = list(csv.DictReader(io.StringIO(strategy_csv(comparison))))
-    assert float(rows[1]["total_mean_m"]) == float(comparison.summary("idm").mean)
-    assert float(rows[3]["share_won"]) == comparison.difference("constant").win_rate
+    assert float(rows[1]["ospa_mean_m"]) == float(comparison.summary("idm").mean)
+    assert float(rows[3]["win_rate"]) == comparison.difference("constant").win_rate
 
 
 def test_csv_has_no_name_that_a_spreadsheet_takes_for_a_formula(runs: dict[str, list[RunRecord]]) -> None:

@@ -150,4 +150,4 @@ def test_tables_comparisons_and_reports_have_its_column(tmp_path: Path) -> None:
     assert float(rows[0]["farthest_m_mean"]) == pytest.approx(compared.summary("jdm", "farthest_m").mean)
     write_report(results, tmp_path / "report.html")
     assert "farthest_m" in (tmp_path / "report.html").read_text(encoding="utf-8")
-    assert json.loads((folder / "manifest.json").read_text())["format_version"] == 6
+    assert json.loads((folder / "manifest.json").read_text())["format_version"] == 7

@@ -117,8 +117,8 @@ def test_a_function_that_is_exact_gives_the_exact_filter(name: str) -> None:
             assert got[0] == pytest.approx(existence, rel=1e-10)
             assert_same_mixtures(got[1], mixture)
         assert info.log_likelihood == pytest.approx(told.log_likelihood, abs=1e-10)
-        assert math.isnan(info.discarded_weight_bound)
-        assert told.discarded_weight_bound == pytest.approx(0.0, abs=1e-12)
+        assert math.isnan(info.truncation_error_bound)
+        assert told.truncation_error_bound == pytest.approx(0.0, abs=1e-12)
 
 
 def test_several_sensors_in_turn_are_the_plain_corrector() -> None:
@@ -155,7 +155,7 @@ def test_several_sensors_in_turn_are_the_plain_corrector() -> None:
         order, other = np.lexsort(means.T), np.lexsort(heaviest.T)
         np.testing.assert_allclose(heaviest[other], means[order], rtol=1e-6, atol=1e-6)
     assert len(tracks) > 1
-    assert math.isnan(info.discarded_weight_bound)
+    assert math.isnan(info.truncation_error_bound)
 
 
 def rewards_of(assignment: Any) -> Floats:

@@ -94,7 +94,7 @@ def test_a_busy_scene_stays_within_the_caps(kind: str) -> None:
         if not belief.is_marginalised:
             assert belief.hyp_log_weights[0] + floor <= belief.hyp_log_weights[-1]
         assert (np.diff(belief.hyp_log_weights) <= 0.0).all()
-        assert 0.0 <= info.discarded_weight_bound <= 1.0
+        assert 0.0 <= info.truncation_error_bound <= 1.0
         assert components(belief) <= (LIMITS.max_components if kind == "marginalised" else 1)
         # A table of tracks that are all in use.
         assert set(belief.hyp_tracks.tolist()) == set(range(belief.tracks.num_tracks))

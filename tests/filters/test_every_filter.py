@@ -388,7 +388,7 @@ def test_angles(kind: Any) -> None:
     for bearing in (math.pi - 0.05 - 2.0 * math.pi, -math.pi - 0.05):
         belief, other = step(tracker, [[bearing, 50.0]], pose=pose)
         assert other.log_likelihood == pytest.approx(info.log_likelihood, rel=1e-9, nan_ok=True)
-        assert (other.num_duplicates, other.num_clutter_raised) == (0, 0)
+        assert (other.num_duplicates, other.num_clutter_floored) == (0, 0)
         assert type(belief) is type(wanted)
     _, twice = step(tracker, [[0.75 * math.pi, 50.0], [-1.25 * math.pi, 50.0]], pose=pose)
     assert twice.num_duplicates == 1
@@ -435,9 +435,9 @@ def test_no_births_and_no_targets(kind: Any) -> None:
 def test_a_measurement_outside_the_region_is_counted(kind: Any) -> None:
     belief, info = step(make(kind), [[10.0, 10.0], [500.0, 0.0], [0.0, -101.0]])
     belief.validate()
-    assert info.num_clutter_raised == 2
+    assert info.num_clutter_floored == 2
     assert kind in UNLABELLED or math.isfinite(info.log_likelihood)
-    assert step(make(kind), NEAR)[1].num_clutter_raised == 0
+    assert step(make(kind), NEAR)[1].num_clutter_floored == 0
 
 
 @every_kind
@@ -445,7 +445,7 @@ def test_no_clutter_at_all(kind: Any) -> None:
     """The one site that may have caused the measurement has."""
     belief, info = step(make(kind, clutter=models.region_clutter(0.0, REGION, "position")), NEAR)
     belief.validate()
-    assert info.num_clutter_raised == 1
+    assert info.num_clutter_floored == 1
     if kind in UNLABELLED:
         assert 0.9 < belief.expected_number < 1.1
     else:
@@ -462,7 +462,7 @@ def test_more_targets_than_caps(kind: Any) -> None:
         assert 4.0 < info.dropped_existence <= 5.0
     else:
         assert belief.num_hyps <= 4
-        assert info.discarded_weight_bound > 0.0
+        assert info.truncation_error_bound > 0.0
         assert existences(belief).sum() > 7.0
 
 

@@ -72,7 +72,7 @@ def test_ranked_equals_enumeration(name):
         assert_same_glmb(plain_glmb(belief), oracle.as_glmb(expected))
         assert info.log_likelihood == pytest.approx(log_likelihood, abs=1e-10)
         assert info.num_hypotheses == belief.num_hyps == len(expected)
-        assert not info.search_cut
+        assert not info.search_truncated
         assert np.all(np.diff(belief.hyp_log_weights) <= 0.0)
         sizes = np.zeros(1 + max(len(tracks) for _, tracks in expected.values()))
         for weight, tracks in expected.values():

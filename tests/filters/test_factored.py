@@ -55,8 +55,8 @@ def test_without_splits_it_equals_enumeration(name):
         assert got.keys() == wanted.keys()
         assert max(abs(got[key] - wanted[key]) for key in wanted) < 1e-10
         assert info.log_likelihood == pytest.approx(log_likelihood, abs=1e-10)
-        assert info.factoring_error < 1e-12
-        assert info.discarded_weight_bound < 1e-12
+        assert info.independence_error_bound < 1e-12
+        assert info.truncation_error_bound < 1e-12
         assert {len(factor.tracks.labels) > 1 for factor in belief.factors} == {True}  # both sites contend
 
 
@@ -100,8 +100,8 @@ def test_targets_far_apart_never_share_a_factor_nor_a_list():
         whole, _ = exact.step(whole, scan, scene.pose, DT, step, rng=rng)
         belief, info = tracker.step(belief, scan, scene.pose, DT, step, rng=rng)
         assert belief.num_factors == 3
-        assert info.factoring_error == 0.0
-        assert info.discarded_weight_bound == 0.0
+        assert info.independence_error_bound == 0.0
+        assert info.truncation_error_bound == 0.0
     sets = oracle.label_set_weights(plain_glmb(whole))
     assert oracle.label_set_weights(plain_product(belief)) == pytest.approx(sets, abs=1e-5)
 
@@ -172,7 +172,7 @@ def assert_bound_holds(seed: int) -> tuple[float, float]:
     )
     got, info = tracker.step(prior, scan, np.zeros(3), DT, 2, rng=rng)
     error = distance(terms_of(plain_product(got)), terms_of(plain_glmb(exact)))
-    bound = info.factoring_error + 4.0 * info.discarded_weight_bound
+    bound = info.independence_error_bound + 4.0 * info.truncation_error_bound
     assert error <= bound + 1e-9, f"seed {seed}: error {error}, bound {bound}"
     return bound, error
 
@@ -189,7 +189,7 @@ def one_scan(prior: FactoredGLMB, scan: Any, sensor: Any, targets: Any, **dials:
     tracker = FactoredGlmbFilter(targets, sensor, **dials)
     got, info = tracker.step(prior, scan, np.zeros(3), DT, 2, rng=rng)
     error, spread = l1_distance(plain_product(got), plain_glmb(exact), 1000, rng)
-    stated = info.factoring_error + info.reduction_error + 4.0 * info.discarded_weight_bound
+    stated = info.independence_error_bound + info.reduction_error + 4.0 * info.truncation_error_bound
     return error, spread, stated + 2.0 * info.dropped_existence
 
 
@@ -264,7 +264,7 @@ def contended(max_search_nodes: int, min_track_weight: float = 1e-5) -> tuple[fl
     _, exact = FactoredGlmbFilter(targets, sensor, Limits.none(), 0.0).step(prior, scan, np.zeros(3), DT, 2, rng=rng)
     wide = dataclasses.replace(few, gate_probability=1.0, min_relative_weight=0.0)
     _, info = FactoredGlmbFilter(targets, sensor, wide, 0.0).step(prior, scan, np.zeros(3), DT, 2, rng=rng)
-    return info.discarded_weight_bound, -math.expm1(info.log_likelihood - exact.log_likelihood), info.search_cut
+    return info.truncation_error_bound, -math.expm1(info.log_likelihood - exact.log_likelihood), info.search_truncated
 
 
 @pytest.mark.parametrize("max_search_nodes", [1, 2, 5, 20, 100])

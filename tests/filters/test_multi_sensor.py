@@ -123,7 +123,7 @@ def test_lmb_equals_enumeration_in_any_order(order):
         belief.validate()
         assert_same_lmb(belief, expected)
         assert info.log_likelihood == pytest.approx(log_density(total, scans), abs=1e-10)
-        assert (info.num_inexact_clusters, info.discarded_weight_bound, info.search_cut) == (0, 0.0, False)
+        assert (info.num_inexact_clusters, info.truncation_error_bound, info.search_truncated) == (0, 0.0, False)
 
 
 def test_certain_and_impossible_tracks():
@@ -174,10 +174,10 @@ def test_what_is_cut_is_bounded(limits):
     cut = dataclasses.replace(limits, min_existence=min(limits.min_existence, 0.02), gate_probability=1.0)
     tracker = make(MultiSensorLmbFilter, limits=cut)
     belief, info = tracker.step(tracker.initial(), SCANS[0], POSES, DT, 1, rng=rng)
-    assert info.search_cut == (limits.max_hypotheses == 3)
-    assert 0.0 < np.abs(belief.existence - exact.existence).max() <= info.discarded_weight_bound <= 1.0
+    assert info.search_truncated == (limits.max_hypotheses == 3)
+    assert 0.0 < np.abs(belief.existence - exact.existence).max() <= info.truncation_error_bound <= 1.0
     few = make(MultiSensorGlmbFilter, limits=Limits(max_hypotheses=3))
     glmb, glmb_info = few.step(few.initial(), SCANS[0], POSES, DT, 1, rng=rng)
     assert glmb.num_hyps == 3
-    assert glmb_info.cap_met
-    assert 0.0 < glmb_info.discarded_weight_bound < 1.0
+    assert glmb_info.limit_reached
+    assert 0.0 < glmb_info.truncation_error_bound < 1.0

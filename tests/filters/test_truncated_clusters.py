@@ -116,4 +116,4 @@ def test_no_target_of_a_crowd_becomes_certain(most: int) -> None:
     posterior.validate()
     assert info.num_inexact_clusters == 1
     assert np.isfinite(posterior.existence_logit).all()
-    assert 0.0 < info.discarded_weight_bound <= 1.0
+    assert 0.0 < info.truncation_error_bound <= 1.0

@@ -88,8 +88,8 @@ def test_what_a_cap_cuts_of_the_combinations_of_a_track_is_told() -> None:
         for kind in (SequentialLmbFilter, MultiSensorLmbFilter):
             central = kind(TARGETS, SENSORS[:1], limits)
             infos.append(central.step(central.initial(), *given, rng=rng())[1])
-        assert [info.search_cut for info in infos] == [cut] * 3
-        assert all((info.discarded_weight_bound > 0.0) == cut for info in infos)
+        assert [info.search_truncated for info in infos] == [cut] * 3
+        assert all((info.truncation_error_bound > 0.0) == cut for info in infos)
 
 
 def test_sequential_is_exact_for_one_target() -> None:

@@ -75,7 +75,7 @@ def test_equal_sites_have_the_number_of_targets_in_closed_form(
     assert number(belief) == pytest.approx(float(exact @ np.arange(len(exact))), abs=0.02)
     size = min(len(exact), len(found), 4)
     np.testing.assert_allclose(found[:size], exact[:size], atol=0.03)
-    assert 0.0 <= info.factoring_error < 0.2
+    assert 0.0 <= info.independence_error_bound < 0.2
 
 
 @pytest.mark.parametrize("num", [10, 40, 100])

@@ -50,7 +50,7 @@ def test_trimmed_numbers_are_reported() -> None:
     belief, info = step(make(CphdFilter, limits, birth=birth(8)))
     belief.validate()
     assert len(belief.log_cardinality) < 9
-    assert 0.0 < info.discarded_weight_bound < 0.5
+    assert 0.0 < info.truncation_error_bound < 0.5
 
 
 @lanes

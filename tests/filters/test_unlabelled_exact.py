@@ -97,7 +97,7 @@ def test_cphd_is_cardinality_and_intensity_of_the_exact_posterior_of_an_iid_clus
         got = mixture_of(posterior, posterior.expected_number)
         assert_same_mixtures(together(got), together(corrected), 1e-10)
         assert info.log_likelihood == pytest.approx(log_likelihood(total, scene, scan), abs=1e-9)
-        assert info.discarded_weight_bound == 0.0
+        assert info.truncation_error_bound == 0.0
         belief = posterior
 
 

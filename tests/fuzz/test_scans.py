@@ -55,8 +55,8 @@ def _check_belief(belief: Any, certain_allowed: bool) -> None:
 
 def _check_info(info: FilterInfo, belief: Any) -> None:
     assert isinstance(belief, MultiBernoulli) or not np.isnan(info.log_likelihood), info
-    assert isinstance(belief, LMB | MultiBernoulli) or 0.0 <= info.discarded_weight_bound <= 1.0, info
-    counts = (info.num_hypotheses, info.num_tracks, info.num_clutter_raised, info.num_duplicates)
+    assert isinstance(belief, LMB | MultiBernoulli) or 0.0 <= info.truncation_error_bound <= 1.0, info
+    counts = (info.num_hypotheses, info.num_tracks, info.num_clutter_floored, info.num_duplicates)
     assert min(*counts, info.num_inexact_clusters, info.dropped_existence) >= 0, info
 
 

@@ -184,7 +184,7 @@ def test_times_poses_and_where_actions_lead() -> None:
     np.testing.assert_allclose(observation["poses"][:, :2], east)
     times = [shown["time"].tolist() for shown, _ in episode(env)]
     assert times == [[10.0, 20.0], [10.0, 10.0], [0.0, 0.0]]
-    assert set(info["health"]) >= {"num_tracks", "discarded_weight_bound", "fusion_num_lost_labels"}
+    assert set(info["health"]) >= {"num_tracks", "truncation_error_bound", "fusion_num_lost_labels"}
 
 
 def test_actions_that_constraints_forbid_are_masked_and_moved() -> None:

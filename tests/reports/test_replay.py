@@ -134,12 +134,12 @@ def test_why_a_decision_was_taken_stands_with_it(tmp_path: Path) -> None:
         found, why = told["why"], decision.plan.explain()
         assert why.of_targets is not None
         assert why.of_sensors is not None
-        assert why.without is not None
+        assert why.reward_without_sensor is not None
         assert found["more"] is None
         gains = [existence + localisation for _, existence, localisation in found["targets"]]
         np.testing.assert_allclose(gains, np.sort(why.of_targets.total)[::-1], rtol=2e-3, atol=1e-3)
         np.testing.assert_allclose([row[2] for row in found["sensors"]], why.of_sensors, rtol=1e-3)
-        np.testing.assert_allclose([row[3] for row in found["sensors"]], why.without, rtol=1e-3)
+        np.testing.assert_allclose([row[3] for row in found["sensors"]], why.reward_without_sensor, rtol=1e-3)
         assert ", ".join(row[1] for row in found["sensors"]) == told["actions"]
         facts = dict(found["facts"])
         assert facts["Bound"] == "the best of all joint actions"

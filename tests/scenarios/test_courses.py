@@ -272,7 +272,7 @@ def test_a_scenario_may_give_courses(tmp_path: Path) -> None:
     one, two = known.sensors
     assert two.heading_deg == pytest.approx(90.0 + 1.41 * math.sin(math.radians(50.7)), abs=0.005)
     assert one.platform.headings_deg == (90.0, 30.0, -45.0, -180.0)
-    steps = BOATS.replace("courses, speed: 5.0", "steps, length: 9.0, speed: 5.0")
+    steps = BOATS.replace("kind: heading, speed: 5.0", "kind: grid_moves, length: 9.0, speed: 5.0")
     assert boats(tmp_path, steps).scenario.model.sensors[0].platform.directions_deg == (90.0, 30.0, -45.0, -180.0)
     turns = BOATS.replace(
         "speed: 5.0, courses_deg: [0, 60, 135, 270]", "speed: 5.0, relative: true, courses_deg: [30, 0]"
@@ -315,7 +315,7 @@ def test_a_program_gets_the_scene_by_compass(tmp_path: Path) -> None:
     told = scene_for_program(known)["sensors"]
     assert [sensor["course_deg"] for sensor in told] == [60.0, 0.0]
     assert told[0]["platform"]["courses_deg"] == (0.0, 60.0, 135.0, 270.0)
-    assert "heading" not in json.dumps(told)
+    assert "heading_" not in json.dumps(told)
     assert build_planner(known, "constant") is not None
 
 

@@ -39,7 +39,7 @@ def explanation_of(plan: Plan, **fields: Any) -> Explanation:
         of_targets=TargetGains(np.array([[1, 0], [3, 2]]), np.array([0.5, -0.25]), np.array([2.0, 1.0])),
         of_undetected=0.75,
         of_sensors=np.array([3.0, 1.0]),
-        without=np.array([1.5, math.inf]),
+        reward_without_sensor=np.array([1.5, math.inf]),
         runner_up=RunnerUp(other, "sensor 1 with heading_deg 30", 0.125, 0.0625),
         bound=Bound(math.inf, 4.0, "by target", 3),
         missing={},
@@ -52,7 +52,7 @@ def explained(record: RunRecord) -> RunRecord:
     """Its decisions explained: all there is, what a decision case by case has, and not at all."""
     first, second, *rest = record.decisions
     whole = explanation_of(first.plan)
-    names = ("baseline", "of_targets", "of_undetected", "of_sensors", "without", "runner_up")
+    names = ("baseline", "of_targets", "of_undetected", "of_sensors", "reward_without_sensor", "runner_up")
     little = explanation_of(
         second.plan,
         **dict.fromkeys(names),
@@ -103,9 +103,9 @@ def test_damaged_explanations_are_named() -> None:
         with pytest.raises(InputError, match=message):
             decode_run(run_facts(record), with_column(table, column, values), "run")
     plan = record.decisions[0].plan
-    wrong = replace(plan, explanation=explanation_of(plan, without=np.zeros(3)))
+    wrong = replace(plan, explanation=explanation_of(plan, reward_without_sensor=np.zeros(3)))
     decisions = (replace(record.decisions[0], plan=wrong),)
-    with pytest.raises(InputError, match=r"plan\.explanation\.without: expected 2 numbers; got \(3,\)"):
+    with pytest.raises(InputError, match=r"plan\.explanation\.reward_without_sensor: expected 2 numbers; got \(3,\)"):
         encode_run(replace(record, decisions=decisions))
 
 

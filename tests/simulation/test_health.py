@@ -98,10 +98,10 @@ def test_the_record_has_reports_of_filters_and_fusion(experiment: Experiment) ->
 def test_a_cap_that_is_met_is_recorded(experiment: Experiment) -> None:
     tight = with_filters(experiment, lambda one: replace(one, limits=replace(one.limits, max_hypotheses=2)))
     health = run(tight).health
-    assert health.cap_met[2:].all()
-    assert (health.discarded_weight_bound[2:] > 0.0).all()
+    assert health.limit_reached[2:].all()
+    assert (health.truncation_error_bound[2:] > 0.0).all()
     searched = with_filters(experiment, lambda one: replace(one, limits=replace(one.limits, max_search_nodes=1)))
-    assert run(searched).health.search_cut.any()
+    assert run(searched).health.search_truncated.any()
 
 
 def test_labels_that_a_sensor_lacks_are_counted_at_that_sensor(experiment: Experiment) -> None:
@@ -132,7 +132,7 @@ def test_every_diagnostic_is_ok_only_where_nothing_was_truncated() -> None:
     health = Health.unreported(40, 2)
     assert all(each.level == "ok" for each in run_diagnostics(health))
     assert diagnostics_line(run_diagnostics(health)) == NOTHING
-    for name in ("cap_met", "search_cut", "num_inexact_clusters", "num_duplicates", "num_clutter_raised"):
+    for name in ("limit_reached", "search_truncated", "num_inexact_clusters", "num_duplicates", "num_clutter_floored"):
         health = Health.unreported(40, 2)
         getattr(health, name)[7, 1] = 1
         assert diagnostics_line(run_diagnostics(health)) != NOTHING, name
@@ -144,13 +144,13 @@ def test_every_diagnostic_is_ok_only_where_nothing_was_truncated() -> None:
 
 def test_bounds_are_named_as_bounds() -> None:
     health = _synthetic().health
-    health.cap_met[:] = 0
-    health.discarded_weight_bound[:] = 0.0004
-    health.factoring_error[:] = 0.0
+    health.limit_reached[:] = 0
+    health.truncation_error_bound[:] = 0.0004
+    health.independence_error_bound[:] = 0.0
     small = diagnostic(health, "Posterior truncated")
     assert (small.text, small.level) == ("weight less than 1 % (mean less than 1 %)", "note")
-    health.discarded_weight_bound[3, 1] = 0.72
-    health.factoring_error[2, 0] = 0.5
+    health.truncation_error_bound[3, 1] = 0.72
+    health.independence_error_bound[2, 0] = 0.5
     large = diagnostic(health, "Posterior truncated")
     assert (large.text, large.level) == ("weight at most 72 % (mean less than 1 %)", "check")
     assert diagnostic(health, "Independence error").text == "at most 25 % (mean less than 1 %)"
@@ -158,7 +158,7 @@ def test_bounds_are_named_as_bounds() -> None:
 
 def test_an_unknown_weight_is_not_reported_as_zero() -> None:
     health = Health.unreported(40, 2)
-    health.discarded_weight_bound[:] = math.nan
+    health.truncation_error_bound[:] = math.nan
     assert math.isnan(summarise_health(health_sums([health])).worst_discarded)
     assert diagnostics_line(run_diagnostics(health)) == "posterior truncated: weight not known"
 
@@ -241,9 +241,8 @@ def test_a_filter_that_raises_is_named_and_what_was_before_is_kept(experiment: E
         run(failing(experiment, cause, 4))
     stop = caught.value
     assert (
-        str(stop)
-        == "paper-e, still, seed 3, run 1: stopped at step 4 of 8 (4 s), in the filter of sensor 2: no hypothesis has "
-        "positive weight"
+        str(stop) == "paper-e, stationary, seed 3, run 1: stopped at step 4 of 8 (4 s), in the filter of sensor 2: no "
+        "hypothesis has positive weight"
     )
     assert stop.__cause__ is cause
     assert (stop.step, stop.time, stop.stage) == (4, 4.0, "the filter of sensor 2")

@@ -203,15 +203,15 @@ def test_altered_and_truncated_files_are_named(saved: Path, file: str) -> None:
         ("{", "cut short or altered"),
         ("[]", "got another file"),
         ('{"format": "photo album"}', "got another file"),
-        ('{"format": "vedette-run", "format_version": 99}', "format 6; got 99, written by a later version"),
+        ('{"format": "vedette-run", "format_version": 99}', "format 7; got 99, written by a later version"),
         (
             '{"format": "vedette-run", "format_version": 3, "versions": {"vedette": "0.1"}}',
-            "expected format 6; got 3, written by an earlier version of this program: run it again, or read it with "
+            "expected format 7; got 3, written by an earlier version of this program: run it again, or read it with "
             "vedette 0.1",
         ),
-        ('{"format": "vedette-run", "format_version": 6}', "fields files and run"),
-        ('{"format": "vedette-run", "format_version": 6, "run": {}, "files": {"../x": ""}}', "plain file names"),
-        ('{"format": "vedette-run", "format_version": 6, "run": {}, "files": {}}', "expected a file timings"),
+        ('{"format": "vedette-run", "format_version": 7}', "fields files and run"),
+        ('{"format": "vedette-run", "format_version": 7, "run": {}, "files": {"../x": ""}}', "plain file names"),
+        ('{"format": "vedette-run", "format_version": 7, "run": {}, "files": {}}', "expected a file timings"),
     ],
 )
 def test_a_broken_manifest_is_named(saved: Path, manifest: str, message: str) -> None:
@@ -344,7 +344,9 @@ def contradictions() -> dict[str, RunRecord]:
         "record.estimates": replace(record, estimates=record.estimates[1:]),
         "record.timings": replace(record, timings={"filter": np.zeros(3)}),
         "record.poses": replace(record, poses=record.poses[1:]),
-        "record.health.cap_met": replace(record, health=replace(record.health, cap_met=record.health.cap_met[1:])),
+        "record.health.limit_reached": replace(
+            record, health=replace(record.health, limit_reached=record.health.limit_reached[1:])
+        ),
         "record.ospa": replace(record, ospa=record.ospa[:, :2]),
         "plan.chosen": replace(record, decisions=(replace(record.decisions[0], plan=plan),)),
         "record.decisions: expected the time 10 s of step 10; got nan": replace(

@@ -48,7 +48,7 @@ TRACKERS: dict[str, dict[str, Any]] = {
         **MEASURED,
         "filter": {"kind": "factored_glmb"},
         "fusion": {"kind": "sequential"},
-        "undetected": {"cell": 100.0, "expected": 1.0, "birth_rate": "learnt", "speed": 5.0},
+        "undetected": {"cell_size": 100.0, "expected": 1.0, "birth_rate": "learnt", "speed": 5.0},
     },
     "matched": {**MEASURED, "fusion": {"kind": "clmb", "matching": "assignment"}, "filter": {"kind": "lmb"}},
     "radio": {**RADIO, **MEASURED, **LMBS},

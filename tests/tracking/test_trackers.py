@@ -178,12 +178,12 @@ def test_measurements_that_one_filter_of_all_left_out_are_counted_once(experimen
     class Leaving(OfFirst):
         def step(self, *args: Any, **kwargs: Any) -> Any:
             belief, info = OfFirst.step(self, *args, **kwargs)
-            return belief, replace(info, num_duplicates=3, cap_met=True)
+            return belief, replace(info, num_duplicates=3, limit_reached=True)
 
     tracker: Any = experiment.tracker
     health = run(replace(experiment, tracker=Central(Leaving(tracker.filters[0], tracker.sensors)))).health
     assert health.num_duplicates.tolist() == [[3, 0]] * 8
-    assert health.cap_met.all()
+    assert health.limit_reached.all()
 
 
 def test_a_decision_from_a_central_belief(experiment: Experiment) -> None:

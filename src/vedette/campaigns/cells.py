@@ -135,11 +135,15 @@ class Campaign(SummaryRepr):
         The number of runs is not included, as more runs leave earlier ones unchanged. texts: result of `texts`, if
         known.
         """
-        cells = [
-            (cell.name, cell.planner, text, _contents(cell.scenario))
-            for cell, text in zip(self.cells, texts or self.texts(), strict=True)
-        ]
-        return hashlib.sha256(json.dumps([self.seed, cells]).encode()).hexdigest()
+        cells = zip(self.cells, texts or self.texts(), strict=True)
+        return digest_of(
+            self.seed, [(cell.name, cell.planner, text, contents_of(cell.scenario)) for cell, text in cells]
+        )
+
+
+def digest_of(seed: int, cells: Sequence[tuple[str, str, str, Sequence[str]]]) -> str:
+    """Return the digest of a campaign from the name, planner, scenario as text and files' checksums of each cell."""
+    return hashlib.sha256(json.dumps([seed, cells]).encode()).hexdigest()
 
 
 def _unmeasured(scenario: Scenario) -> ScenarioModel:
@@ -235,7 +239,8 @@ def safe_name(text: str) -> str:
     return re.sub(r"[^\w.+-]+", "_", text)
 
 
-def _contents(scenario: Scenario) -> list[str]:
+def contents_of(scenario: Scenario) -> list[str]:
+    """Return the SHA-256 of each file that a run of the scenario depends on. Raises `OSError` for a missing one."""
     return [
         hashlib.sha256(file.read_bytes()).hexdigest() for file in scenario_files(_unmeasured(scenario), scenario.folder)
     ]

@@ -9,7 +9,7 @@ from __future__ import annotations
 import io
 import json
 import zipfile
-from collections.abc import Container
+from collections.abc import Container, Mapping
 from typing import Any
 
 from vedette.errors import InputError
@@ -17,7 +17,7 @@ from vedette.internal.reading import error_summary, parse_json, read_members
 from vedette.simulation import serialization
 from vedette.simulation.records import RunRecord, RunSummary
 from vedette.simulation.tables import run_facts
-from vedette.simulation.upgrading import upgraded_files
+from vedette.simulation.upgrading import upgraded_facts, upgraded_files
 
 _RUN = "run.json"
 _EPOCH = (1980, 1, 1, 0, 0, 0)  # the earliest time in a zip archive
@@ -54,10 +54,14 @@ def decode_summary(payload: bytes, timings: bytes | None = None) -> RunSummary:
     return serialization.decode_summary(facts, members, "run", timings)
 
 
-def upgraded(payload: bytes, number: int) -> bytes:
-    """Return the bytes of a run of format `number` in the present format. Raises `InputError` as `decode`."""
+def upgraded(payload: bytes, number: int, strategies: Mapping[str, str]) -> bytes:
+    """Return the bytes of a run of format `number` in the present format.
+
+    strategies: present names of strategies by former ones. Raises `InputError` as `decode`.
+    """
     facts, members = _members(payload)
-    return encode(serialization.decode_run(facts, upgraded_files(members, number), "run"))
+    files = upgraded_files(members, number, strategies)
+    return encode(serialization.decode_run(upgraded_facts(facts, strategies), files, "run"))
 
 
 def _members(payload: bytes, wanted: Container[str] | None = None) -> tuple[dict[str, Any], dict[str, bytes]]:

@@ -162,9 +162,9 @@ def lock_of(folder: Path) -> sqlite3.Connection:
     return lock
 
 
-def check_contents(path: Path, found: Sequence[tuple[str]], contents: str) -> None:
-    """Raise `InputError` unless the file contains only the checksum of the manifest."""
-    if list(found) != [(contents,)]:
+def check_contents(path: Path, found: Sequence[tuple[str]], *contents: str) -> None:
+    """Raise `InputError` unless the file contains only the checksum of the manifest, or one of several."""
+    if list(found) not in [[(each,)] for each in contents]:
         raise InputError(
             f"{path}: expected the runs of the manifest beside it; they are another campaign's, or the manifest was "
             "altered"

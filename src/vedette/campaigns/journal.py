@@ -28,8 +28,11 @@ class Writer:
         assert self._opened is not None  # set by `open_runs`
         return self._opened
 
-    def open_runs(self, contents: str) -> None:
-        """Create the file, or check that it belongs to the campaign whose manifest has the checksum `contents`."""
+    def open_runs(self, contents: str, *others: str) -> None:
+        """Create the file, or check that it belongs to the campaign whose manifest has the checksum `contents`.
+
+        others: further checksums that the file may have.
+        """
         with database.translated_errors(self._path):
             opened = sqlite3.connect(self._path, timeout=database.WAIT, isolation_level=None, check_same_thread=False)
             self._opened = opened
@@ -43,7 +46,7 @@ class Writer:
             database.check_tables(self._path, opened)
             found = opened.execute("SELECT contents FROM campaign").fetchall()
             opened.execute("COMMIT")
-        database.check_contents(self._path, found, contents)
+        database.check_contents(self._path, found, contents, *others)
 
     def put(self, rows: Sequence[Row], session: int) -> None:
         """Store runs, all or none; when this returns they survive any failure of this process or machine.
@@ -127,8 +130,8 @@ class Writer:
             raise InputError(f"{reader}: {place}expected the bytes that another folder has of it; got others")
         return False
 
-    def rewrite(self, payload: Callable[[Entry], bytes]) -> None:
-        """Replace the payload of every run, in one transaction.
+    def rewrite(self, payload: Callable[[Entry], bytes], contents: str) -> None:
+        """Replace the payload of every run, and the checksum of the manifest, in one transaction.
 
         Raises `InputError`, and changes nothing, for a damaged run; also raises as `payload`.
         """
@@ -138,6 +141,7 @@ class Writer:
             with self._database:
                 for key in keys:
                     self._rewrite(*key, payload)
+                self._database.execute("UPDATE campaign SET contents = ?", (contents,))
 
     def _rewrite(self, cell: str, run: int, payload: Callable[[Entry], bytes]) -> None:
         where = f"{self._path}: {database.place_of(cell, run)}"

@@ -2,11 +2,21 @@
 
 from __future__ import annotations
 
+import json
+from collections.abc import Mapping
+from functools import reduce
 from pathlib import Path
+from typing import Any
 
 from vedette.campaigns import codec, journal
-from vedette.campaigns.manifest import contents_checksum, read_manifest, write_manifest
+from vedette.campaigns.cells import contents_of, digest_of
+from vedette.campaigns.manifest import campaign_of, contents_checksum, read_manifest, write_manifest
+from vedette.campaigns.renamed import present_field, with_present_names
+from vedette.campaigns.spec import spec_from_data
 from vedette.errors import InputError
+from vedette.scenarios.dumping import dump_data
+from vedette.scenarios.renamed import STRATEGIES, changed, changes
+from vedette.scenarios.yaml_reader import read_yaml
 from vedette.simulation.serialization import FORMAT_VERSION
 from vedette.simulation.storage import check_upgradable, holds_run
 from vedette.simulation.upgrading import upgrade_run
@@ -25,16 +35,59 @@ def upgrade_results(directory: Path | str) -> int:
     if not folder.is_dir():
         raise InputError(f"{folder}: expected a results folder; got {'a file' if folder.exists() else 'nothing'}")
     if holds_run(folder):
-        return upgrade_run(folder)
+        return upgrade_run(folder, STRATEGIES, _upgraded_scenario)
     manifest = read_manifest(folder, check_upgradable)
     number: int = manifest["format_version"]
     if number == FORMAT_VERSION:
         return number
+    fresh = {**_upgraded_manifest(folder, manifest), "format_version": FORMAT_VERSION, "upgraded_from": number}
     writer = journal.Writer(folder)
     try:
-        writer.open_runs(contents_checksum(manifest))
-        writer.rewrite(lambda entry: codec.upgraded(entry.payload, number))
-        write_manifest(folder, {**manifest, "format_version": FORMAT_VERSION, "upgraded_from": number})
+        contents = contents_checksum(fresh)
+        writer.open_runs(contents_checksum(manifest), contents)
+        writer.rewrite(lambda entry: codec.upgraded(entry.payload, number, STRATEGIES), contents)
+        write_manifest(folder, fresh)
     finally:
         writer.close()
     return number
+
+
+def _upgraded_scenario(text: str) -> str:
+    """Return the text of a stored scenario with present names; unchanged if it has no other."""
+    data = read_yaml(text, "scenario").data
+    found = list(changes(data))
+    return dump_data(reduce(changed, found, data)) if found else text
+
+
+def _upgraded_manifest(folder: Path, manifest: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the manifest with present names; names of cells, which identify runs, stay."""
+    spec = with_present_names(manifest["spec"])
+    specification = spec_from_data({**spec, "runs": manifest["num_runs"]}, "spec")
+    cells = [
+        {**cell, "planner": own["planner"], "settings": own, "scenario": _upgraded_scenario(cell["scenario"])}
+        for cell, own in zip(manifest["cells"], specification.settings(), strict=True)
+    ]
+    compare = present_field(manifest["compare"])
+    plain = json.loads(json.dumps({"spec": spec, "axes": specification.axes(), "compare": compare, "cells": cells}))
+    fresh = {**manifest, **plain}
+    return {**fresh, "digest": _upgraded_digest(folder, manifest, fresh)}
+
+
+def _upgraded_digest(folder: Path, before: Mapping[str, Any], after: Mapping[str, Any]) -> str:
+    """Return the digest with present names; unchanged if the files that it covers are missing or have changed."""
+    digest: str = before["digest"]
+    try:
+        contents = [contents_of(cell.scenario) for cell in campaign_of(folder, after).cells]
+    except OSError:
+        return digest
+    found = [
+        digest_of(
+            manifest["seed"],
+            [
+                (cell["name"], cell["planner"], cell["scenario"], own)
+                for cell, own in zip(manifest["cells"], contents, strict=True)
+            ],
+        )
+        for manifest in (before, after)
+    ]
+    return found[1] if found[0] == digest else digest

@@ -26,9 +26,9 @@ def calibration_document(calibration: Calibration, names: tuple[str, ...]) -> di
                 "unit": each.parameter.unit,
                 "assumed": each.parameter.start,
                 "estimate": each.value if not each.reason else None,
-                "low": each.ci_low,
-                "high": each.ci_high,
-                "why_not": each.reason or None,
+                "ci_low": each.ci_low,
+                "ci_high": each.ci_high,
+                "reason": each.reason or None,
             }
             for each in calibration.estimates
         ],

@@ -26,7 +26,7 @@ import typer
 if TYPE_CHECKING:
     from rich.console import Console
 
-FORMAT_VERSION = 1  # of the documents of `--json`; incremented when a key is renamed or removed
+FORMAT_VERSION = 2  # of the documents of `--json`; incremented when a key is renamed or removed
 _DISK_FULL = (errno.ENOSPC, errno.EIO, getattr(errno, "EDQUOT", errno.ENOSPC), errno.EFBIG)
 
 

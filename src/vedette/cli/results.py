@@ -64,7 +64,7 @@ def report(
             if is_run
             else _report_campaign(folder, page, figures, replays, trust)
         )
-    emit_json({"page": page, "figures": written, "without_measurements_of": untrusted_code})
+    emit_json({"page": page, "figures": written, "replays_without_measurements": untrusted_code})
 
 
 WrittenReport = tuple[Sequence[Path], Sequence[str]]
@@ -129,9 +129,40 @@ def _parse_cell_and_run(text: str) -> tuple[str, int]:
 
 
 def upgrade(
-    folder: Annotated[Path, typer.Argument(metavar="DIR", help="Results folder of a campaign, or of a single run.")],
+    path: Annotated[
+        Path,
+        typer.Argument(
+            metavar="PATH",
+            help="Results folder of a campaign or of a single run, scenario or sensors file (YAML), or campaign file "
+            "(TOML).",
+        ),
+    ],
 ) -> None:
-    """Bring a results folder of an earlier format to the one that this version reads, in place."""
+    """Bring results, a scenario or sensors file, or a campaign file of an earlier version up to date, in place.
+
+    In files, former keys and values get their present names; comments and layout stay.
+    """
+    if path.is_file():
+        _upgrade_file(path)
+    else:
+        _upgrade_folder(path)
+
+
+def _upgrade_file(path: Path) -> None:
+    if path.with_name("manifest.json").exists():
+        raise usage_error(f"expected the folder of these results, {path.parent}; got a file in it", "PATH")
+    if path.suffix.lower() == ".toml":
+        from vedette.campaigns.renamed import upgrade_campaign_file as upgrade_file
+    else:
+        from vedette.scenarios.upgrading import upgrade_scenario_file as upgrade_file
+    lines = upgrade_file(path)
+    for line in lines:
+        say(str(line))
+    say(f"{path}: {pluralise(len(lines), 'change')}" if lines else f"{path}: up to date; nothing was changed")
+    publish({"file": path, "changes": [line._asdict() for line in lines]})
+
+
+def _upgrade_folder(folder: Path) -> None:
     require_packages("vedette upgrade", "pyarrow")
     with interruptible("nothing is lost; the same command goes on"):
         from vedette.campaigns.upgrading import upgrade_results
@@ -144,7 +175,7 @@ def upgrade(
             echo(f"{folder}: format {number} is now {FORMAT_VERSION}")
             if (tables := folder / "tables").is_dir():
                 echo(f"next: vedette results {folder} --export {tables}, to write its tables anew")
-        emit_json({"folder": folder, "format_was": number, "format": FORMAT_VERSION})
+        emit_json({"folder": folder, "previous_format": number, "format": FORMAT_VERSION})
 
 
 _MAX_SHOWN_FAILURES = 10

@@ -57,4 +57,4 @@ def video(
     if untrusted_code:
         note(f"without measurements, as drawing them runs {', '.join(untrusted_code)}: --trust allows it")
     echo(f"wrote {out}: {pluralise(number, 'frame')}, {number / fps:.1f} s")
-    emit_json({"video": out, "frames": number, "seconds": number / fps, "without_measurements_of": untrusted_code})
+    emit_json({"video": out, "frames": number, "seconds": number / fps, "replays_without_measurements": untrusted_code})

@@ -97,7 +97,7 @@ class DecisionAnalysis:
 
     def _shares(self, missing: dict[str, str]) -> dict[str, Any]:
         """Return the fields of an `Explanation` with contributions; reasons for None are put in `missing`."""
-        names = ("baseline", "of_targets", "of_undetected", "of_sensors", "without")
+        names = ("baseline", "of_targets", "of_undetected", "of_sensors", "reward_without_sensor")
         contributions: dict[str, Any] = dict.fromkeys(names)
         each = [shares for shares in self._contributions if shares is not None]
         if len(each) < len(self.parts):
@@ -111,7 +111,7 @@ class DecisionAnalysis:
         contributions["baseline"] = sum(shares.baseline for shares in each)
         contributions["of_undetected"] = sum(shares.found for shares in each)
         contributions["of_sensors"] = np.concatenate([shares.sensors for shares in each])
-        contributions["without"] = reward - last
+        contributions["reward_without_sensor"] = reward - last
         contributions["of_targets"] = self._targets(each)
         if contributions["of_targets"] is None:
             missing["of_targets"] = _NOT_LINEAR

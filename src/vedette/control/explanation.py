@@ -121,7 +121,8 @@ class Explanation:
         of_undetected: gain from undetected targets.
         of_sensors: (num_sensors,) contribution of each sensor to the gain, less its price: half of what it adds to the
             sensors before it and half of what it adds to those after it (a Shapley value on two orders).
-        without: (num_sensors,) the reward had the sensor not scanned, at no price, given the other sensors' choices.
+        reward_without_sensor: (num_sensors,) the reward had the sensor not scanned, at no price, given the other
+            sensors' choices.
         runner_up: the best other joint action that was evaluated.
         bound: upper bound on the best reward; None if no bound is available.
         missing: reasons for fields that are None, by name.
@@ -138,7 +139,7 @@ class Explanation:
     of_targets: TargetGains | None
     of_undetected: float | None
     of_sensors: Floats | None
-    without: Floats | None
+    reward_without_sensor: Floats | None
     runner_up: RunnerUp | None
     bound: Bound | None
     missing: dict[str, str]
@@ -182,7 +183,7 @@ class Explanation:
 
 
 # Fields that may be None, with a reason.
-EXPLAINED = ("reward", "baseline", "of_targets", "of_undetected", "of_sensors", "without", "runner_up")
+EXPLAINED = ("reward", "baseline", "of_targets", "of_undetected", "of_sensors", "reward_without_sensor", "runner_up")
 
 
 def _ratio(difference: float, error: float | None) -> float | None:
@@ -268,7 +269,7 @@ def _of_targets(explanation: Explanation) -> list[str]:
 
 
 def _of_sensors(explanation: Explanation) -> list[str]:
-    shares, without = explanation.of_sensors, explanation.without
+    shares, without = explanation.of_sensors, explanation.reward_without_sensor
     if shares is None or without is None:
         return []
     lines = [f"{'sensor':8s}{'share':>12s}{'without it':>14s}  action"]

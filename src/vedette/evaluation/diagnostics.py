@@ -115,8 +115,8 @@ def _filter_diagnostics(health: HealthSummary) -> Iterator[Diagnostic]:
     yield Diagnostic(
         "Association search cut short",
         "The ranking of associations stopped at max_search_nodes.",
-        _scans(health.search_cut),
-        _level(health.search_cut),
+        _scans(health.search_truncated),
+        _level(health.search_truncated),
     )
     yield Diagnostic(
         "Cluster approximated",
@@ -147,13 +147,13 @@ def _truncation(health: HealthSummary) -> str:
         weight = f"weight {_bound(health.worst_discarded)} (mean {_bound(health.mean_discarded)})"
     else:
         weight = "weight 0 %"
-    return f"{weight}, limit reached at {_scans(health.cap_met)}" if health.cap_met else weight
+    return f"{weight}, limit reached at {_scans(health.limit_reached)}" if health.limit_reached else weight
 
 
 def _truncation_level(health: HealthSummary) -> Level:
     if health.worst_discarded > 0.0:  # neither zero nor unknown
         return _level(health.worst_discarded, _CHECK_ABOVE)
-    return "check" if health.cap_met else "note" if math.isnan(health.worst_discarded) else "ok"
+    return "check" if health.limit_reached else "note" if math.isnan(health.worst_discarded) else "ok"
 
 
 def _measurement_diagnostics(health: HealthSummary) -> Iterator[Diagnostic]:

@@ -20,8 +20,8 @@ class HealthSums(NamedTuple):
     """
 
     num_scans: int
-    cap_met: int  # scans
-    search_cut: int  # scans
+    limit_reached: int  # scans
+    search_truncated: int  # scans
     inexact: int  # scans
     discarded: float  # sum over scans and sensors with a known value
     num_discarded: int  # of these
@@ -53,18 +53,18 @@ def health_sums(healths: Sequence[Health]) -> HealthSums:
         happened = concatenated(name) > 0
         return int(happened.reshape(len(happened), -1).any(axis=1).sum())
 
-    discarded, factoring = concatenated("discarded_weight_bound"), concatenated("factoring_error")
+    discarded, factoring = concatenated("truncation_error_bound"), concatenated("independence_error_bound")
     lacking = concatenated("num_missing_labels") > 0
     return HealthSums(
         len(lacking),
-        scans("cap_met"),
-        scans("search_cut"),
+        scans("limit_reached"),
+        scans("search_truncated"),
         scans("num_inexact_clusters"),
         *_sum_and_worst(discarded),
         *_sum_and_worst(factoring),
         float(concatenated("dropped_existence").max()),
         int(concatenated("num_duplicates").sum()),
-        int(concatenated("num_clutter_raised").sum()),
+        int(concatenated("num_clutter_floored").sum()),
         concatenated("num_missing_sets").sum(axis=0, dtype=np.float64),
         int(concatenated("fusion_num_sets").sum()),
         lacking.sum(axis=0, dtype=np.float64),
@@ -96,8 +96,8 @@ class HealthSummary:
 
     Attributes:
         num_scans: of all runs.
-        cap_met, search_cut, inexact: share of the scans at which a filter reached a limit, its ranking search was cut
-            short, an LMB cluster was not summed exactly.
+        limit_reached, search_truncated, inexact: share of the scans at which a filter reached a limit, its ranking
+            search was cut short, an LMB cluster was not summed exactly.
         mean_discarded, worst_discarded: upper bound on the share of a filter's weight that was truncated; NaN if
             unknown.
         mean_factoring, worst_factoring: upper bound on the L1 error of a factored filter from treating labels as
@@ -114,8 +114,8 @@ class HealthSummary:
     """
 
     num_scans: int
-    cap_met: float
-    search_cut: float
+    limit_reached: float
+    search_truncated: float
     inexact: float
     mean_discarded: float
     worst_discarded: float
@@ -142,8 +142,8 @@ def summarise_health(sums: HealthSums, sensors: Sequence[str] = ()) -> HealthSum
     num_scans, known, factored = sums.num_scans, sums.num_discarded, sums.num_factoring
     return HealthSummary(
         num_scans=num_scans,
-        cap_met=sums.cap_met / num_scans,
-        search_cut=sums.search_cut / num_scans,
+        limit_reached=sums.limit_reached / num_scans,
+        search_truncated=sums.search_truncated / num_scans,
         inexact=sums.inexact / num_scans,
         mean_discarded=mean(sums.discarded, known),
         worst_discarded=sums.worst_discarded if known else np.nan,

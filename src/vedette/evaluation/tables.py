@@ -128,7 +128,8 @@ def strategy_numbers(comparison: Comparison, strategy: str) -> dict[str, str | f
     """Return the unrounded numbers of a strategy by name: errors, the paired difference, measures."""
     difference = comparison.difference(strategy)
     paired = difference.summary
-    parts = [_means(comparison, strategy, part, f"{part}_mean_m", f"{part}_se_m") for part in PARTS]
+    columns = [(part, "ospa" if part == "total" else part) for part in PARTS]
+    parts = [_means(comparison, strategy, part, f"{name}_mean_m", f"{name}_se_m") for part, name in columns]
     measures = [_means(comparison, strategy, name, f"{name}_mean", f"{name}_se") for name in comparison.measures]
     tail = strategy_tail(comparison, strategy)
     return {
@@ -140,12 +141,12 @@ def strategy_numbers(comparison: Comparison, strategy: str) -> dict[str, str | f
         "share_lost": tail.lost,
         "difference_m": float(paired.mean),
         "difference_se_m": float(paired.standard_error),
-        "low_m": float(paired.low),
-        "high_m": float(paired.high),
+        "ci_low_m": float(paired.low),
+        "ci_high_m": float(paired.high),
         "interval": "bootstrap" if difference.is_skewed else "t",
         "p_value": difference.p_value,
         "p_holm": float(comparison.p_values()[comparison.strategies.index(strategy)]),
-        "share_won": difference.win_rate,
+        "win_rate": difference.win_rate,
         **dict(itertools.chain(*measures)),
     }
 

@@ -67,7 +67,7 @@ class CustomMarginals:
     row, is their product. The function writes the log probability of each option into `out` and returns the log of the
     total weight of all joint choices, which gives the log likelihood of the scan; -inf if none is possible.
 
-    The result is not known to be exact, so `FilterInfo.discarded_weight_bound` is NaN.
+    The result is not known to be exact, so `FilterInfo.truncation_error_bound` is NaN.
 
     Attributes:
         function: the function.
@@ -108,7 +108,7 @@ class BeliefPropagation(Checked):
 
     The cost grows with the number of options, however many tracks compete. The result is exact if the graph of tracks
     and gated measurements has no loop. Otherwise it is an approximation of unknown accuracy:
-    `FilterInfo.discarded_weight_bound` is NaN.
+    `FilterInfo.truncation_error_bound` is NaN.
 
     Attributes:
         max_sweeps: largest number of sweeps over all options.

@@ -160,14 +160,14 @@ class _FactoredFilterBase(LabelledFilterBase[FactoredGLMB]):
             log_likelihood=log_likelihood,
             num_hypotheses=found.num_hyps,
             num_tracks=found.tracks.num_tracks,
-            discarded_weight_bound=max(0.0, -math.expm1(sum(report.log_kept for report in reports))),
+            truncation_error_bound=max(0.0, -math.expm1(sum(report.log_kept for report in reports))),
             dropped_existence=dropped,
-            num_clutter_raised=sum(int(report.num_raised) for report in reports),
+            num_clutter_floored=sum(int(report.num_raised) for report in reports),
             num_duplicates=sum(map(len, repeats)),
             num_inexact_clusters=0,
-            search_cut=any(bool(report.cut) for report in reports),
-            cap_met=is_full or any(bool(report.full) for report in reports),
-            factoring_error=min(2.0, factoring),
+            search_truncated=any(bool(report.cut) for report in reports),
+            limit_reached=is_full or any(bool(report.full) for report in reports),
+            independence_error_bound=min(2.0, factoring),
             reduction_error=min(2.0, sum(float(report.reduction_error) for report in reports)),
         )
 
@@ -195,7 +195,7 @@ class FactoredGlmbFilter(_FactoredFilterBase, LabelledFilter[FactoredGLMB]):
             their products is at most this, and at most .01; see `scans_together`.
         max_factor_labels: of a factored_glmb: largest number of labels of a factor, and a quarter of the largest number
             updated jointly at a scan; if more labels interact, factors are linked from the strongest association on,
-            and links that would join more are left out. `FilterInfo.factoring_error` bounds the error.
+            and links that would join more are left out. `FilterInfo.independence_error_bound` bounds the error.
         scans_together: number of scans of one time that update one belief, of this sensor and others, as with
             `ParallelUpdate`. The error of a weak link that is cut counts once for each: for S scans the cutting
             threshold is S^2 times smaller.

@@ -52,13 +52,13 @@ class _GlmbFilterBase(LabelledFilterBase[GLMB]):
             log_likelihood=log_likelihood,
             num_hypotheses=len(kept.hyp_log_weights),
             num_tracks=len(kept.tracks.labels),
-            discarded_weight_bound=max(0.0, -math.expm1(sum(log_kept))),
+            truncation_error_bound=max(0.0, -math.expm1(sum(log_kept))),
             dropped_existence=spread,
-            num_clutter_raised=sum(num_raised),
+            num_clutter_floored=sum(num_raised),
             num_duplicates=sum(map(len, repeats)),
             num_inexact_clusters=0,
-            search_cut=any(cut),
-            cap_met=any(full),
+            search_truncated=any(cut),
+            limit_reached=any(full),
         )
 
 
@@ -124,7 +124,7 @@ class MultiSensorGlmbFilter(_GlmbFilterBase, SequentialUpdate[GLMB]):
 
     With caps, hypotheses are truncated after every sensor by their weights at that point. A hypothesis that the first
     sensors make unlikely is lost even if a later sensor would have raised its weight, so the order of the sensors
-    matters a little. `discarded_weight_bound` counts the weight that is discarded at each sensor.
+    matters a little. `truncation_error_bound` counts the weight that is discarded at each sensor.
 
     Attributes:
         targets: motion, survival and birth models.

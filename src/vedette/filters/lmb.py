@@ -46,13 +46,13 @@ class LmbFilterBase(LabelledFilterBase[LMB]):
             log_likelihood=log_likelihood,
             num_hypotheses=1,
             num_tracks=len(kept.tracks.labels),
-            discarded_weight_bound=max(-math.expm1(sum(log_kept)), 0.0),  # keeps NaN
+            truncation_error_bound=max(-math.expm1(sum(log_kept)), 0.0),  # keeps NaN
             dropped_existence=sum(dropped) + spread,
-            num_clutter_raised=sum(num_raised),
+            num_clutter_floored=sum(num_raised),
             num_duplicates=sum(map(len, repeats)),
             num_inexact_clusters=sum(num_ranked),
-            search_cut=any(cut),
-            cap_met=len(posterior.existence_logit) >= self.limits.max_labels,
+            search_truncated=any(cut),
+            limit_reached=len(posterior.existence_logit) >= self.limits.max_labels,
         )
 
 

@@ -29,10 +29,10 @@ class MultiSensorLmbFilter(LmbFilterBase, MultiSensorFilter[LMB]):
     evaluated, at the result of the earlier ones.
 
     `limits` truncates, and the report counts: combinations of a track that are surely less probable than
-    `min_existence`, or beyond the `max_hypotheses` heaviest at a sensor (`search_cut`; counted by their weight there,
-    before later sensors); and, in a cluster of tracks that compete for many measurements, sets of taken measurements
-    beyond the `max_hypotheses` heaviest, or lighter than `min_relative_weight` times the heaviest
-    (`num_inexact_clusters`). All of it is in `discarded_weight_bound`. The number of combinations grows exponentially
+    `min_existence`, or beyond the `max_hypotheses` heaviest at a sensor (`search_truncated`; counted by their weight
+    there, before later sensors); and, in a cluster of tracks that compete for many measurements, sets of taken
+    measurements beyond the `max_hypotheses` heaviest, or lighter than `min_relative_weight` times the heaviest
+    (`num_inexact_clusters`). All of it is in `truncation_error_bound`. The number of combinations grows exponentially
     with the number of sensors that observe a track, up to `max_hypotheses`.
 
     Attributes and errors: as `MultiSensorGlmbFilter`.

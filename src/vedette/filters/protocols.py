@@ -22,7 +22,7 @@ class FilterInfo:
             the kept hypotheses. NaN for the CB-MeMBer filter, which does not need it.
         num_hypotheses, num_tracks: size of the posterior; for a PHD or CPHD filter 1 and the number of components, for
             a CB-MeMBer filter 1 and the number of Bernoullis.
-        discarded_weight_bound: upper bound on the share of the posterior weight that the caps left out. Attained unless
+        truncation_error_bound: upper bound on the share of the posterior weight that the caps left out. Attained unless
             tracks that share measurements compete for more than six of them; 0 if nothing was left out. Weight outside
             the gates is not included. For an LMB, the share of all joint choices that is left out of the inexact
             clusters, where the overlap of pairs of tracks is counted once; it bounds the error of every existence and
@@ -34,38 +34,39 @@ class FilterInfo:
         dropped_existence: expected number of targets in labels that an LMB, or Bernoullis that a CB-MeMBer filter,
             dropped or bounded by `Limits.max_existence`; 0 for a PHD or CPHD filter, which redistributes the weight it
             drops.
-        num_clutter_raised: number of measurements whose clutter intensity was raised to `Limits.min_log_clutter`.
+        num_clutter_floored: number of measurements whose clutter intensity was raised to `Limits.min_log_clutter`.
         num_duplicates: number of measurements that repeat another to the last digit and were left out.
         num_inexact_clusters: number of LMB clusters summed over their heaviest joint choices only (with several
             sensors: clusters in which not all sets of taken measurements were followed); 0 for other filters.
-        search_cut: True if ranking stopped at `Limits.max_search_nodes` before it was complete; False if nothing is
-            ranked. For an LMB of several sensors, or updated apart from its prediction, True if a track had more than
-            `Limits.max_hypotheses` combinations.
-        cap_met: True if the posterior was as large as `Limits` allows, so that more may have been cut off: hypotheses
-            of a GLMB, labels of an LMB, Bernoullis of a CB-MeMBer filter, components of a PHD or CPHD filter.
-        factoring_error: for a factored density, upper bound on the L1 error of treating labels as independent at this
-            scan; 0 for other filters.
+        search_truncated: True if ranking stopped at `Limits.max_search_nodes` before it was complete; False if nothing
+            is ranked. For an LMB of several sensors, or updated apart from its prediction, True if a track had more
+            than `Limits.max_hypotheses` combinations.
+        limit_reached: True if the posterior was as large as `Limits` allows, so that more may have been cut off:
+            hypotheses of a GLMB, labels of an LMB, Bernoullis of a CB-MeMBer filter, components of a PHD or CPHD
+            filter.
+        independence_error_bound: for a factored density, upper bound on the L1 error of treating labels as independent
+            at this scan; 0 for other filters.
         reduction_error: for a factored density, upper bound on the L1 error of merging versions of a label, and of
             reducing the Gaussians of a track, at this scan; 0 for other filters, which do not compute it. Not stored
-            with runs. The posterior is within factoring_error + reduction_error + 4 discarded_weight_bound of the exact
-            one in L1, apart from gates and dropped labels: weight that is cut off is missing once and added to the rest
-            once, and twice if the association probabilities are those of the rest alone. The error of belief
-            propagation between groups that share several measurements in a cycle is not included. The bound is for one
-            scan, given the belief before it; bounds of several scans do not add up to a bound, as a scan may amplify an
-            earlier error.
+            with runs. The posterior is within independence_error_bound + reduction_error + 4 truncation_error_bound of
+            the exact one in L1, apart from gates and dropped labels: weight that is cut off is missing once and added
+            to the rest once, and twice if the association probabilities are those of the rest alone. The error of
+            belief propagation between groups that share several measurements in a cycle is not included. The bound is
+            for one scan, given the belief before it; bounds of several scans do not add up to a bound, as a scan may
+            amplify an earlier error.
     """
 
     log_likelihood: float
     num_hypotheses: int
     num_tracks: int
-    discarded_weight_bound: float
+    truncation_error_bound: float
     dropped_existence: float
-    num_clutter_raised: int
+    num_clutter_floored: int
     num_duplicates: int
     num_inexact_clusters: int
-    search_cut: bool
-    cap_met: bool
-    factoring_error: float = 0.0
+    search_truncated: bool
+    limit_reached: bool
+    independence_error_bound: float = 0.0
     reduction_error: float = 0.0
 
 

@@ -61,13 +61,13 @@ class UnlabelledFilter(SingleSensorFilter, ABC, Generic[_Density]):
             log_likelihood=log_likelihood,
             num_hypotheses=1,
             num_tracks=num_tracks,
-            discarded_weight_bound=discarded,
+            truncation_error_bound=discarded,
             dropped_existence=0.0,
-            num_clutter_raised=int(report.num_raised),
+            num_clutter_floored=int(report.num_raised),
             num_duplicates=0,
             num_inexact_clusters=0,
-            search_cut=False,
-            cap_met=num_tracks >= most,
+            search_truncated=False,
+            limit_reached=num_tracks >= most,
         )
 
 

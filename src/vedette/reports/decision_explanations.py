@@ -87,12 +87,12 @@ def _targets(gains: TargetGains) -> dict[str, Any]:
 
 
 def _sensors(plan: Plan, explanation: Explanation) -> list[tuple[int, str, float, float]]:
-    if explanation.of_sensors is None or explanation.without is None:
+    if explanation.of_sensors is None or explanation.reward_without_sensor is None:
         return []
     return [
         (s, describe_action(rounded(own.columns, own.values[chosen])), _number(share), _number(without))
         for s, (own, chosen, share, without) in enumerate(
-            zip(plan.actions, plan.chosen, explanation.of_sensors.tolist(), explanation.without.tolist(), strict=True)
+            zip(plan.actions, plan.chosen, explanation.of_sensors.tolist(), explanation.reward_without_sensor.tolist(), strict=True)
         )
     ]
 

@@ -29,7 +29,7 @@ EXPLANATION_TABLES: dict[str, Layout] = {
             "evaluations": Kind.INTEGER,
             "bound": Kind.VALUE,
             "bound_kind": Kind.TEXT,
-            "bound_unbounded": Kind.COUNT,
+            "num_targets_without_bound": Kind.COUNT,
             "runner_up": Kind.TEXT,
             "margin": Kind.VALUE,
             "margin_se": Kind.VALUE,
@@ -46,7 +46,9 @@ EXPLANATION_TABLES: dict[str, Layout] = {
             "localisation_gain": Kind.NUMBER,
         }
     ),
-    "sensor_gains": Layout({**DECISION, "sensor": Kind.INTEGER, "gain": Kind.NUMBER, "without": Kind.NUMBER}),
+    "sensor_gains": Layout(
+        {**DECISION, "sensor": Kind.INTEGER, "gain": Kind.NUMBER, "reward_without_sensor": Kind.NUMBER}
+    ),
 }
 
 
@@ -58,7 +60,7 @@ def explanation_tables(decisions: Sequence[Decision], num_sensors: int) -> dict[
     explained = [(number, each, each.plan.explanation) for number, each in enumerate(decisions)]
     stored = [(number, each, explanation) for number, each, explanation in explained if explanation is not None]
     for _, _, explanation in stored:
-        for name in ("of_sensors", "without"):
+        for name in ("of_sensors", "reward_without_sensor"):
             values = getattr(explanation, name)
             if values is not None and np.shape(values) != (num_sensors,):
                 raise InputError(f"plan.explanation.{name}: expected {num_sensors} numbers; got {np.shape(values)}")
@@ -76,8 +78,12 @@ def explanation_tables(decisions: Sequence[Decision], num_sensors: int) -> dict[
             labels = {"birth_step": gains.labels[:, 0], "birth_site": gains.labels[:, 1]}
             gained = {"existence_gain": gains.existence, "localisation_gain": gains.localisation}
             parts["target_gains"].append({**of, **labels, **gained})
-        if explanation.of_sensors is not None and explanation.without is not None:
-            shares = {"sensor": np.arange(num_sensors), "gain": explanation.of_sensors, "without": explanation.without}
+        if explanation.of_sensors is not None and explanation.reward_without_sensor is not None:
+            shares = {
+                "sensor": np.arange(num_sensors),
+                "gain": explanation.of_sensors,
+                "reward_without_sensor": explanation.reward_without_sensor,
+            }
             parts["sensor_gains"].append({**of, **shares})
     return {
         name: stacked(
@@ -98,7 +104,7 @@ def _explanation_columns(explanation: Explanation) -> dict[str, Any]:
         "evaluations": explanation.evaluations,
         "bound": np.nan if bound is None else bound.upper,
         "bound_kind": "" if bound is None else bound.kind,
-        "bound_unbounded": -1 if bound is None else bound.unbounded,
+        "num_targets_without_bound": -1 if bound is None else bound.unbounded,
         "runner_up": "" if second is None else second.text,
         "margin": np.nan if second is None else second.margin,
         "margin_se": np.nan if second is None else _or_nan(second.standard_error),
@@ -140,7 +146,7 @@ def _explanation(
     bound = None
     if kind:
         assert reward is not None
-        bound = Bound(float(table["bound"][row]), reward, kind, int(table["bound_unbounded"][row]))
+        bound = Bound(float(table["bound"][row]), reward, kind, int(table["num_targets_without_bound"][row]))
     if len(sensors["sensor"]) not in (0, plan.num_sensors):
         raise InputError(f"sensor_gains: expected rows of {plan.num_sensors} sensors; got {len(sensors['sensor'])}")
     has_sensors = len(sensors["sensor"]) > 0
@@ -154,7 +160,7 @@ def _explanation(
         of_targets=None if "of_targets" in missing else _gains(targets),
         of_undetected=_number(table["undetected_gain"][row]),
         of_sensors=sensors["gain"] if has_sensors else None,
-        without=sensors["without"] if has_sensors else None,
+        reward_without_sensor=sensors["reward_without_sensor"] if has_sensors else None,
         runner_up=None if "runner_up" in missing else _runner_up(plan, table, row),
         bound=bound,
         missing=missing,

@@ -31,14 +31,14 @@ class Health(SummaryRepr):
     Attributes:
         log_likelihood: log likelihood of the scan, given the prior.
         num_hypotheses, num_tracks: size of the posterior.
-        discarded_weight_bound: upper bound on the truncated share of posterior weight; NaN if unknown.
+        truncation_error_bound: upper bound on the truncated share of posterior weight; NaN if unknown.
         dropped_existence: expected number of targets in dropped labels.
-        num_clutter_raised: measurements whose clutter intensity was raised to its floor.
+        num_clutter_floored: measurements whose clutter intensity was raised to its floor.
         num_duplicates: measurements left out because they repeat another.
         num_inexact_clusters: clusters of an LMB not summed exactly.
-        search_cut: whether the ranking search stopped early.
-        cap_met: whether the posterior reached its maximum size.
-        factoring_error: upper bound on the L1 error of treating labels as independent, for factored densities.
+        search_truncated: whether the ranking search stopped early.
+        limit_reached: whether the posterior reached its maximum size.
+        independence_error_bound: upper bound on the L1 error of treating labels as independent, for factored densities.
         num_missing_sets: label sets that another sensor has and this one does not (for CLMB, labels).
         num_missing_labels: labels that this sensor does not know at all.
         bytes_sent: bytes that this sensor sent by radio, or to the fusion centre; 0 if not counted.
@@ -52,14 +52,14 @@ class Health(SummaryRepr):
     log_likelihood: Floats
     num_hypotheses: Ints
     num_tracks: Ints
-    discarded_weight_bound: Floats
+    truncation_error_bound: Floats
     dropped_existence: Floats
-    num_clutter_raised: Ints
+    num_clutter_floored: Ints
     num_duplicates: Ints
     num_inexact_clusters: Ints
-    search_cut: Ints
-    cap_met: Ints
-    factoring_error: Floats
+    search_truncated: Ints
+    limit_reached: Ints
+    independence_error_bound: Floats
     num_missing_sets: Ints
     num_missing_labels: Ints
     bytes_sent: Ints
@@ -130,7 +130,7 @@ class Health(SummaryRepr):
 
 _DTYPES = {field.name: np.dtype(np.float64 if field.type == "Floats" else np.int64) for field in fields(Health)}
 _KINDS = {name: Kind.NUMBER if dtype == np.float64 else Kind.INTEGER for name, dtype in _DTYPES.items()}
-_OF_SCANS = ("num_clutter_raised", "num_duplicates")  # summed over the sensors
+_OF_SCANS = ("num_clutter_floored", "num_duplicates")  # summed over the sensors
 _OF_FILTER = tuple(field.name for field in fields(FilterInfo) if field.name in _DTYPES)
 _reported = attrgetter(*_OF_FILTER)
 

@@ -102,7 +102,7 @@ class ProgramFilter:
 
 def unknown_info(num_labels: int) -> FilterInfo:
     """Return the report of a step with nothing known except the number of labels."""
-    return FilterInfo(nan, 1, num_labels, 0.0, 0.0, 0, 0, 0, search_cut=False, cap_met=False)
+    return FilterInfo(nan, 1, num_labels, 0.0, 0.0, 0, 0, 0, search_truncated=False, limit_reached=False)
 
 
 class _Row:
