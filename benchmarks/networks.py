@@ -1,4 +1,4 @@
-"""The ways of making one picture of several sensors' scans, side by side on the yardsticks of docs/networks.md.
+"""The ways of making one picture of several sensors' scans, side by side on the scenes of docs/networks.md.
 
     python benchmarks/networks.py                                              # every campaign network-*.toml
     python benchmarks/networks.py examples/campaigns/network-three-positions.toml --runs 200 --workers 2

@@ -1,6 +1,6 @@
 """Stone Soup's sensor managers with its reward of uncertainty as an entrant; for the Python that has `stonesoup`.
 
-    vedette benchmark --planner "stone-soup=PYTHON benchmarks/entrants/stone_soup_manager.py" --seconds 60
+    vedette benchmark --planner "stone-soup=PYTHON benchmarks/entrants/stone_soup_manager.py" --timeout 60
 
 Every joint action by `BruteForceSensorManager` where there are few, otherwise `GreedySensorManager`, each sensor by
 itself. The reward is how much a measurement at the end of the horizon takes off the covariances of the tracks that are

@@ -166,7 +166,7 @@ def test_the_command_ends_with_tables_and_a_page(tmp_path: Path, monkeypatch: py
         "print(input() and '{\"ready\": true}', flush=True)\nraise SystemExit('not today')"
     )
     words = ["--planner", f"mine={sys.executable} mine.py", "--planner", f"bad={sys.executable} bad.py"]
-    asked = ["benchmark", *words, "--runs", "2", "--workers", "1", "--seconds", "20"]
+    asked = ["benchmark", *words, "--runs", "2", "--workers", "1", "--timeout", "20"]
     for _ in range(2):  # again: what is there is not run again, what was lost is tried again
         result = CliRunner().invoke(app, asked, env={"COLUMNS": "160"})
         assert result.exit_code == 0, result.output

@@ -71,7 +71,9 @@ def test_letters_that_an_encoding_lacks_are_question_marks(odd: Path, encoding: 
 
 @posix
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="there is no full device")
-@pytest.mark.parametrize("command", [("list",), ("schema",), ("show", "paper-a"), ("show", "paper-a", "--resolved")])
+@pytest.mark.parametrize(
+    "command", [("list",), ("schema",), ("show", "paper-a"), ("show", "paper-a", "--with-defaults")]
+)
 def test_a_full_device_is_one_line(command: tuple[str, ...]) -> None:
     with Path("/dev/full").open("wb") as full:
         done = program(*command, stdout=full)

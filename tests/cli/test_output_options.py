@@ -76,8 +76,9 @@ CALLS: list[tuple[tuple[str, ...], set[str]]] = [
     (("merge", "trial-shards", "--out", "merged"), {"folder", "runs", "finished", "missing_shards", "commands"}),
     (("results", "trial-results", "--export", "tables", "--tex", "table.tex"), {"comparisons", "missing", "written"}),
     (("upgrade", "trial-results"), {"folder", "previous_format", "format"}),
+    (("upgrade", "short.yaml"), {"file", "changes"}),
     (("report", "trial-results"), {"page", "figures"}),
-    (("demo", "short.yaml", "--planners", "still,own", "--workers", "1"), {"comparisons", "page"}),
+    (("demo", "short.yaml", "--planners", "stationary,own", "--workers", "1"), {"comparisons", "page"}),
     (
         ("reproduce", "short.yaml", "--runs", "1", "--planners", "stationary", "--workers", "1"),
         {"comparisons", "report"},
@@ -99,7 +100,7 @@ def test_json_is_one_document_and_quiet_is_silence(place: Path) -> None:
         assert result.exit_code == 0, result.output
         document = json.loads(result.stdout)
         assert keys <= set(document), words
-        assert next(iter(document.items())) == ("version", 1)
+        assert next(iter(document.items())) == ("version", 2)
         for path in (*document.get("written", ()), *filter(None, (document.get("folder"), document.get("page")))):
             assert Path(path).exists()
     for words in LISTS:
@@ -230,6 +231,23 @@ def test_shell_completion_lists_names(place: Path, words: tuple[str, ...], expec
     )
     assert done.stderr == ""
     assert done.stdout.split() == expected
+
+
+@pytest.mark.parametrize(
+    ("words", "option"),
+    [
+        (("run", "paper-a", "--trust"), "--allow-code"),
+        (("video", "run", "--out", "a.gif", "--speed", "2"), "--time-scale"),
+        (("track", "scans.csv", "--sensors", "radars.yaml", "--speed", "2"), "--max-target-speed"),
+        (("show", "paper-a", "--resolved"), "--with-defaults"),
+        (("run", "paper-a", "--plannr", "jdm"), "--planner"),
+    ],
+    ids=lambda each: " ".join(each) if isinstance(each, tuple) else each,
+)
+def test_an_unknown_option_suggests_the_present_one(words: tuple[str, ...], option: str) -> None:
+    result = call(*words)
+    assert result.exit_code == 2
+    assert option in result.stderr
 
 
 def test_missing_shards_are_listed_with_the_commands_that_run_them(place: Path) -> None:

@@ -35,7 +35,7 @@ def test_the_page_and_the_figures_are_written_where_they_should_be(folder: Path,
 
 
 def test_the_page_is_in_the_folder_by_default_and_shows_the_chosen_runs(folder: Path) -> None:
-    result = report(folder, "--runs", "still:1, fixed:0")
+    result = report(folder, "--runs", "stationary:1, constant:0")
     assert result.exit_code == 0, result.output
     page = (folder / "report.html").read_text("utf-8")
     assert "Not moving, run 1" in page
@@ -46,9 +46,9 @@ def test_the_page_is_in_the_folder_by_default_and_shows_the_chosen_runs(folder: 
     ("runs", "status", "message"),
     [
         ("constant", 2, "expected CELL:RUN, such as jdm:0; got 'constant'"),
-        ("fixed:x", 2, "got 'fixed:x'"),
-        ("fixed:0,", 2, "got ''"),
-        ("fixed:7", 1, "--runs: expected a finished run of cell fixed (0 to 1); got 7"),
+        ("constant:x", 2, "got 'constant:x'"),
+        ("constant:0,", 2, "got ''"),
+        ("constant:7", 1, "--runs: expected a finished run of cell constant (0 to 1); got 7"),
         ("gone:0", 1, "--runs: expected one of constant, stationary; got 'gone'"),
     ],
 )

@@ -46,16 +46,16 @@ def test_the_list_names_every_published_comparison() -> None:
 def test_a_published_comparison_is_run_and_printed_next_to_published_numbers(short: PublishedComparison) -> None:
     result = call(NAME, "--planners", "random,constant")
     assert result.exit_code == 0, result.output
-    assert "published: FDCD     3.39 ± 0.15" in result.stdout
+    assert "published: FDCD 3.39 ± 0.15" in " ".join(result.stdout.split())
     assert "arXiv 2604.19160" in " ".join(result.stdout.split())
     assert f"{NAME}, seed 0: all 4 runs are finished" in result.stdout
     folder = Path(f"{NAME}-results")
     assert [open_results(folder).finished(cell) for cell in ("random", "constant")] == [(0, 1), (0, 1)]
     assert sorted(file.name for file in folder.iterdir() if file.suffix in (".md", ".html")) == [
+        "published-comparison.md",
         "report.html",
-        "yardstick.md",
     ]
-    page = (folder / "yardstick.md").read_text(encoding="utf-8")
+    page = (folder / "published-comparison.md").read_text(encoding="utf-8")
     assert page.startswith(f"# {short.title}\n\n| Strategy | OSPA (m) |")
 
 
@@ -104,7 +104,8 @@ def test_ctrl_c_prints_how_to_continue(short: PublishedComparison, monkeypatch: 
         (
             ("deciding-six-camera",),
             1,
-            "deciding-six-camera: no such file; expected a yardstick (deciding-six-cameras), a YAML file or one of",
+            "deciding-six-camera: no such file; expected a published comparison (deciding-six-cameras), a YAML file "
+            "or one of",
         ),
         ((NAME, "--runs", "0"), 2, "--runs"),
     ],

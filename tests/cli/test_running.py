@@ -121,7 +121,7 @@ def test_reproduce(scenario_file, tmp_path):
     out = tmp_path / "all"
     result = call("reproduce", scenario_file, "--runs", 2, "--planners", "idm,stationary", "--workers", 1, "--out", out)
     assert result.exit_code == 0, result.output
-    assert "idm    independent decisions, CS divergence, other sensors absent" in result.output
+    assert "idm independent decisions, CS divergence, other sensors absent" in " ".join(result.output.split())
     results = open_results(out)
     assert [results.finished(cell) for cell in ("idm", "stationary")] == [(0, 1), (0, 1)]
     for name in ("report.html", "summary.md", "summary.csv", "figures/ospa.pdf", "tables/scans.parquet"):

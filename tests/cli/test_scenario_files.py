@@ -101,7 +101,7 @@ def test_generate_writes_a_commented_file_that_passes_check(tmp_path: Path) -> N
 
 def test_generate_names_the_file_after_the_scene(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
-    assert vedette("generate", "--sensors", "2", "--view", "full").exit_code == 0
+    assert vedette("generate", "--sensors", "2", "--field-of-view", "full").exit_code == 0
     assert vedette("generate", "own.yml", "--targets", "3").exit_code == 0
     assert sorted(file.name for file in tmp_path.iterdir()) == ["own.yml", "spread-full-2.yaml", "vedette.schema.json"]
 
@@ -110,7 +110,7 @@ def test_generate_names_the_file_after_the_scene(tmp_path: Path, monkeypatch: py
     ("words", "status", "message"),
     [
         (("--pattern", "swarm"), 2, "expected one of spread, crowd; got swarm"),
-        (("--view", "none"), 2, "expected one of full, limited; got none"),
+        (("--field-of-view", "none"), 2, "expected one of full, limited; got none"),
         (("--sensors", "0"), 2, "Invalid value for '--sensors'"),
     ],
 )
@@ -125,7 +125,7 @@ def test_crowd_writes_a_commented_file_that_passes_check(tmp_path: Path, monkeyp
     monkeypatch.chdir(tmp_path)
     result = vedette("crowd", "--targets", "10000", "--density", "4")
     assert (result.exit_code, result.stderr) == (0, "")
-    assert vedette("crowd", "scenes", "--measured", "bearing_range", "--clutter", "1", "--steps", "5").exit_code == 0
+    assert vedette("crowd", "scenes", "--measurement", "bearing_range", "--clutter", "1", "--steps", "5").exit_code == 0
     files = [Path("crowd-10000-density-4.yaml"), Path("scenes/crowd-100-clutter-1-bearing-range-steps-5.yaml")]
     assert (
         files[0].read_text(encoding="utf-8").startswith("# yaml-language-server: $schema=vedette.schema.json\n# A cro")
@@ -139,7 +139,7 @@ def test_crowd_writes_a_commented_file_that_passes_check(tmp_path: Path, monkeyp
 @pytest.mark.parametrize(
     ("words", "message"),
     [
-        (("--measured", "range"), "expected one of position, bearing_range; got range"),
+        (("--measurement", "range"), "expected one of position, bearing_range; got range"),
         (("--targets", "0"), "Invalid value for '--targets'"),
         (("--density", "0"), "Invalid value for '--density'"),
     ],

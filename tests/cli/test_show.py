@@ -81,7 +81,7 @@ def test_sensors_that_differ_are_each_described(tmp_path: Path) -> None:
 
 
 def test_resolved_prints_yaml_that_reads_back() -> None:
-    result = show("paper-e", "--resolved")
+    result = show("paper-e", "--with-defaults")
     assert parse_scenario(result.stdout) == load_scenario("paper-e").model
 
 

@@ -37,7 +37,7 @@ def call(*words: object) -> Result:
 @pytest.mark.parametrize("name", ["track", "run"])
 def test_a_gif_has_the_size_and_the_length_that_were_asked_for(runs: Path, tmp_path: Path, name: str) -> None:
     out = tmp_path / "new" / "run.gif"
-    result = call(runs / name, "--out", out, "--seconds", 2, "--fps", 5, "--size", 300)
+    result = call(runs / name, "--out", out, "--duration", 2, "--fps", 5, "--size", 300)
     assert result.exit_code == 0, result.output
     assert result.stdout.strip() == f"wrote {out}: 10 frames, 2.0 s"
     assert [path.name for path in out.parent.iterdir()] == ["run.gif"]
@@ -52,7 +52,7 @@ def test_a_gif_has_the_size_and_the_length_that_were_asked_for(runs: Path, tmp_p
 
 
 def test_speed_is_the_run_over_the_video(runs: Path, tmp_path: Path) -> None:
-    result = call(runs / "run", "--out", tmp_path / "run.gif", "--speed", 13, "--fps", 2, "--size", 200)
+    result = call(runs / "run", "--out", tmp_path / "run.gif", "--time-scale", 13, "--fps", 2, "--size", 200)
     assert result.stdout.strip().endswith(": 6 frames, 3.0 s")  # 39 s of the run
 
 
@@ -104,7 +104,7 @@ def test_a_missing_or_failing_ffmpeg_is_reported(
         monkeypatch.setenv("PATH", f"{programs}{os.pathsep}{os.environ['PATH']}")
     else:
         monkeypatch.setenv("PATH", str(programs))
-    result = call(runs / "run", "--out", tmp_path / "run.mp4", "--seconds", 1, "--fps", 3, "--size", 200)
+    result = call(runs / "run", "--out", tmp_path / "run.mp4", "--duration", 1, "--fps", 3, "--size", 200)
     assert result.exit_code == 1
     (line,) = result.output.splitlines()
     if is_there:
@@ -117,7 +117,7 @@ def test_a_missing_or_failing_ffmpeg_is_reported(
 
 @pytest.mark.skipif(shutil.which("ffmpeg") is None, reason="no ffmpeg on PATH to write MP4 with")
 def test_an_mp4_is_one(runs: Path, tmp_path: Path) -> None:
-    result = call(runs / "run", "--out", tmp_path / "run.mp4", "--seconds", 1, "--fps", 3, "--size", 201)
+    result = call(runs / "run", "--out", tmp_path / "run.mp4", "--duration", 1, "--fps", 3, "--size", 201)
     assert result.exit_code == 0, result.output
     assert (tmp_path / "run.mp4").read_bytes()[4:8] == b"ftyp"
 
@@ -126,8 +126,8 @@ def test_an_mp4_is_one(runs: Path, tmp_path: Path) -> None:
     ("words", "status", "message"),
     [
         (("run.avi",), 1, "--out: expected a file that ends with .mp4 or .gif; got run.avi"),
-        (("a.gif", "--seconds", 500), 1, "--seconds: expected at most 1000 frames of a .gif file; got 5000"),
-        (("a.gif", "--seconds", 5, "--speed", 2), 2, "expected one of --speed and --seconds; got both"),
+        (("a.gif", "--duration", 500), 1, "--duration: expected at most 1000 frames of a .gif file; got 5000"),
+        (("a.gif", "--duration", 5, "--time-scale", 2), 2, "expected one of --time-scale and --duration; got both"),
         (("a.gif", "--size", 20), 2, "for '--size': expected greater than or equal to 200; got '20'"),
     ],
 )

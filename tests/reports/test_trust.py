@@ -72,11 +72,11 @@ def test_reading_results_runs_no_code_that_they_name(results: Path, scenario: Pa
     said = call("report", results, "--figures", tmp_path / "figures")
     assert not mark.exists()
     assert "without measurements, as drawing them runs" in said
-    assert "models.py:sees: --trust allows it" in said
+    assert "models.py:sees: --allow-code allows it" in said
     page = (results / "report.html").read_text()
     assert "measurements are left out" in page
     assert _scans(page) == []
-    assert "without measurements" not in call("report", results, "--trust")
+    assert "without measurements" not in call("report", results, "--allow-code")
     assert mark.exists()
     assert len(_scans((results / "report.html").read_text())) == 40
 
@@ -98,7 +98,7 @@ def test_a_module_that_a_manifest_names_is_not_run(results: Path, scenario: Path
     assert "os:system" in cell["scenario"]
     (results / "manifest.json").write_text(json.dumps(manifest))
     sign_manifest(results)
-    assert "os:system: --trust allows it" in call("report", results)
+    assert "os:system: --allow-code allows it" in call("report", results)
     assert not mark.exists()
 
 
@@ -118,9 +118,9 @@ def test_code_that_others_may_have_written_needs_a_word(scenario: Path, what: st
     for command in (("run", scenario), ("show", scenario), ("campaign", spec, "--dry-run"), ("reproduce", scenario)):
         result = CliRunner().invoke(app, [str(each) for each in command])
         assert result.exit_code == 1, result.output
-        assert f"every user may write to {place.resolve()}: read it, and have it run by --trust" in result.output
+        assert f"every user may write to {place.resolve()}: read it, and have it run by --allow-code" in result.output
     assert not scenario.with_name("mark").exists()
-    assert "runs code of theirs, as trusted: models.py:sees" in call("campaign", spec, "--dry-run", "--trust")
+    assert "runs code of theirs, as trusted: models.py:sees" in call("campaign", spec, "--dry-run", "--allow-code")
     assert scenario.with_name("mark").exists()
 
 

@@ -168,7 +168,7 @@ def test_tracked_scans_keep_it(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) 
     for words in (
         ["track", "scans.csv", "--sensors", "radars.yaml", "--out", "deep/run"],
         ["report", "deep/run"],
-        ["video", "deep/run", "--out", "a.gif", "--seconds", "0.2"],
+        ["video", "deep/run", "--out", "a.gif", "--duration", "0.2"],
     ):
         result = CliRunner().invoke(app, words)
         assert result.exit_code == 0, result.output

@@ -58,8 +58,8 @@ def test_a_scene_says_the_settings_that_differ_from_the_usual() -> None:
     text = scene_text(scene)
     assert scene.name == "crowd-limited-3-targets-7-every-5-seed-4"
     assert (
-        "#   vedette generate --sensors 3 --pattern crowd --view limited --targets 7 --decide-every 5 --seed 4\n"
-        in text
+        "#   vedette generate --sensors 3 --pattern crowd --field-of-view limited --targets 7 --decide-every 5 "
+        "--seed 4\n" in text
     )
     model = parse_scenario(text)
     assert len(model.birth.sites) == 7

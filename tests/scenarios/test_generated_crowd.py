@@ -50,7 +50,7 @@ def test_equal_settings_give_equal_files_and_seeds_equal_targets() -> None:
 def test_a_crowd_says_the_settings_that_differ_from_the_usual() -> None:
     crowd = GeneratedCrowd(num_targets=7, density=3.5, clutter=0.0, measured="bearing_range", num_steps=9)
     assert crowd.name == "crowd-7-density-3.5-clutter-0-bearing-range-steps-9"
-    command = "#   vedette crowd --targets 7 --density 3.5 --clutter 0 --measured bearing_range --steps 9\n"
+    command = "#   vedette crowd --targets 7 --density 3.5 --clutter 0 --measurement bearing_range --steps 9\n"
     assert command in crowd_text(crowd)
     assert GeneratedCrowd().name == "crowd-100"
 

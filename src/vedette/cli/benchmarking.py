@@ -44,7 +44,7 @@ def benchmark(
     ] = None,
     quick: Annotated[bool, typer.Option("--quick", help="Only the small scenes; takes a minute.")] = False,
     seconds: Annotated[
-        float, typer.Option("--seconds", metavar="SECONDS", min=1e-3, help="Time limit of a program for each answer.")
+        float, typer.Option("--timeout", metavar="SECONDS", min=1e-3, help="Time limit of a program for each answer.")
     ] = 1.0,
     seed: Seed = 0,
     workers: Workers = 0,

@@ -31,7 +31,7 @@ def calibrate(
     ] = None,
     overwrite: Overwrite = False,
     position: Annotated[
-        bool, typer.Option("--position", help="Also estimate errors of the sensor positions (x, y).")
+        bool, typer.Option("--sensor-positions", help="Also estimate errors of the sensor positions (x, y).")
     ] = False,
     window: Annotated[
         float | None,

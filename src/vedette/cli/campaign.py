@@ -95,7 +95,7 @@ def campaign(
         return
     folder = out or Path(resolved.default_folder if (shard or slurm) is None else resolved.default_shards)
     if slurm is not None and time is not None:
-        options = [*([f"--runs={runs}"] if runs else []), *(["--trust"] if trust else [])]
+        options = [*([f"--runs={runs}"] if runs else []), *(["--allow-code"] if trust else [])]
         _print_job(resolved, slurm, time, ["vedette", "campaign", str(spec), "--out", str(folder), *options])
         return
     if shard is not None:

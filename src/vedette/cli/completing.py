@@ -35,7 +35,7 @@ def reproducible(incomplete: str) -> list[str]:
 
 
 def strategies(context: typer.Context, incomplete: str) -> list[str]:
-    """Return matching strategies, including those of the scenario or yardstick that the command line names."""
+    """Return matching strategies, including those of the scenario or comparison that the command line names."""
     return _matching(incomplete, _strategies(_first_argument(context)))
 
 

@@ -28,7 +28,7 @@ Workers = Annotated[
     typer.Option("--workers", metavar="N", min=0, help="Worker processes; 1: no extra process, 0: one per CPU."),
 ]
 Trust = Annotated[
-    bool, typer.Option("--trust", help="Run Python code named in a scenario that other users can modify.")
+    bool, typer.Option("--allow-code", help="Run Python code named in a scenario that other users can modify.")
 ]
 BAD_ROWS = ("refuse", "skip")
 SensorsFile = Annotated[

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from vedette.campaigns.published import CheckedClaim, PublishedComparison
     from vedette.campaigns.results import GroupComparison
 
-PUBLISHED_PAGE = "yardstick.md"
+PUBLISHED_PAGE = "published-comparison.md"
 _RUNS = 30
 _STRATEGIES = ("jdm", "idm", "assigned_target", "random")
 _FOLDER = "reproduction"
@@ -37,7 +37,8 @@ def reproduce(
     name: Annotated[
         str,
         typer.Argument(
-            help="A yardstick of --list, a built-in scenario, or a scenario file.", autocompletion=reproducible
+            help="A published comparison of --list, a built-in scenario, or a scenario file.",
+            autocompletion=reproducible,
         ),
     ] = "paper-a",
     planners: Annotated[
@@ -45,21 +46,21 @@ def reproduce(
         typer.Option(
             "--planners",
             metavar="LIST",
-            help="Strategies to compare, the first is the reference; else the yardstick's, or "
-            "jdm,idm,assigned_target,random.",
+            help="Strategies to compare, the first is the reference; else those of the published "
+            "comparison, or jdm,idm,assigned_target,random.",
             autocompletion=lists_of_strategies,
         ),
     ] = None,
     runs: Annotated[
-        int | None, typer.Option("--runs", min=1, help="Paired runs of each strategy; else the yardstick's, or 30.")
+        int | None, typer.Option("--runs", min=1, help="Paired runs of each strategy; else as published, or 30.")
     ] = None,
     seed: Seed = 0,
     workers: Workers = 0,
     out: Annotated[
         Path | None,
-        typer.Option("--out", metavar="DIR", help="Folder for all of it; else reproduction, or as the yardstick."),
+        typer.Option("--out", metavar="DIR", help="Folder for all of it; else reproduction, or the comparison's name."),
     ] = None,
-    list_: Annotated[bool, typer.Option("--list", help="List the yardsticks, and stop.")] = False,
+    list_: Annotated[bool, typer.Option("--list", help="List the published comparisons, and stop.")] = False,
     trust: Trust = False,
 ) -> None:
     """Compare strategies over paired runs, as the paper does, or on a published scene beside what is published of it.
@@ -118,7 +119,9 @@ def comparison_spec(
     from vedette.scenarios.loading import missing_scenario
 
     if scenario not in list_builtin() and not os.path.isfile(scenario):
-        raise missing_scenario(scenario, f"a yardstick ({', '.join(published_comparisons())}), ", list(list_builtin()))
+        raise missing_scenario(
+            scenario, f"a published comparison ({', '.join(published_comparisons())}), ", list(list_builtin())
+        )
     loaded = load_scenario(scenario)
     for strategy in _names(planners) or ():
         check_planner(loaded, strategy, "--planners")

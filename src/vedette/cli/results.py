@@ -45,7 +45,8 @@ def report(
         ),
     ] = None,
     trust: Annotated[
-        bool, typer.Option("--trust", help="Run code that the scenarios of the results name, to draw measurements.")
+        bool,
+        typer.Option("--allow-code", help="Run code that the scenarios of the results name, to draw measurements."),
     ] = False,
 ) -> None:
     """Report on a campaign or a run: one page that opens anywhere, with tables, figures and a replay of runs."""
@@ -101,7 +102,7 @@ def _report_run(folder: Path, page: Path, figures: Path | None, trust: bool) -> 
 def _print_page(page: Path, untrusted_code: Sequence[str]) -> None:
     echo(f"wrote {page}")
     if untrusted_code:
-        note(f"without measurements, as drawing them runs {', '.join(untrusted_code)}: --trust allows it")
+        note(f"without measurements, as drawing them runs {', '.join(untrusted_code)}: --allow-code allows it")
 
 
 def _figures(folder: Path | None, write: Callable[[Path], Sequence[Path]]) -> Sequence[Path]:

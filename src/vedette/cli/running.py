@@ -70,7 +70,7 @@ class CodeTrust:
         if reason and not self._trust:
             raise InputError(
                 f"scenario {scenario.path or scenario.name}: expected code of your own; it runs {', '.join(code)}, and "
-                f"{reason}: read it, and have it run by --trust"
+                f"{reason}: read it, and have it run by --allow-code"
             )
         if new := [name for name in code if name not in self._reported]:
             note(f"runs code of {'theirs, as trusted' if reason else 'yours'}: {', '.join(new)}")

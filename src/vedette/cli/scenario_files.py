@@ -74,7 +74,7 @@ def generate(
     view: Annotated[
         str,
         typer.Option(
-            "--view",
+            "--field-of-view",
             metavar="NAME",
             help="limited: sensors see 250 m; full: they see everything.",
             autocompletion=one_of("limited", "full"),
@@ -92,7 +92,7 @@ def generate(
     """
     from vedette.scenarios.generated import PATTERNS, VIEWS, GeneratedScene, scene_text
 
-    for name, value, known in (("--pattern", pattern, PATTERNS), ("--view", view, VIEWS)):
+    for name, value, known in (("--pattern", pattern, PATTERNS), ("--field-of-view", view, VIEWS)):
         if value not in known:
             raise usage_error(f"expected one of {', '.join(known)}; got {value}", name)
     scene = GeneratedScene(
@@ -116,7 +116,7 @@ def crowd(
     measured: Annotated[
         str,
         typer.Option(
-            "--measured",
+            "--measurement",
             metavar="NAME",
             help="position, or bearing_range from outside the square.",
             autocompletion=one_of("position", "bearing_range"),
@@ -132,7 +132,7 @@ def crowd(
     from vedette.scenarios.generated_crowd import MEASURED, GeneratedCrowd, crowd_text
 
     if measured not in MEASURED:
-        raise usage_error(f"expected one of {', '.join(MEASURED)}; got {measured}", "--measured")
+        raise usage_error(f"expected one of {', '.join(MEASURED)}; got {measured}", "--measurement")
     scene = GeneratedCrowd(num_targets=targets, density=density, clutter=clutter, measured=measured, num_steps=steps)
     _write_generated(path, scene.name, crowd_text(scene), overwrite)
 

@@ -31,7 +31,7 @@ def show(
     out: Annotated[
         Path | None, typer.Option("--out", metavar="FILE", help="Draw a picture (.png, .pdf or .svg).")
     ] = None,
-    resolved: Annotated[bool, typer.Option("--resolved", help="Print YAML with every default instead.")] = False,
+    resolved: Annotated[bool, typer.Option("--with-defaults", help="Print YAML with every default instead.")] = False,
     trust: Trust = False,
 ) -> None:
     """Show a scenario as tables and as a picture.

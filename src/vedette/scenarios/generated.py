@@ -145,7 +145,7 @@ def scene_text(scene: GeneratedScene) -> str:
 
 
 def _command(scene: GeneratedScene) -> str:
-    options = [f"--sensors {scene.num_sensors}", f"--pattern {scene.pattern}", f"--view {scene.view}"]
+    options = [f"--sensors {scene.num_sensors}", f"--pattern {scene.pattern}", f"--field-of-view {scene.view}"]
     options += [] if scene.num_targets is None else [f"--targets {scene.num_targets}"]
     options += [] if scene.decide_every == 1 else [f"--decide-every {scene.decide_every}"]
     options += [] if scene.seed == 0 else [f"--seed {scene.seed}"]

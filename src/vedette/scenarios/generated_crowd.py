@@ -111,7 +111,7 @@ def _summary(crowd: GeneratedCrowd) -> str:
 def _command(crowd: GeneratedCrowd) -> str:
     default, options = GeneratedCrowd(), [f"--targets {crowd.num_targets}", f"--density {crowd.density:g}"]
     options += [] if crowd.clutter == default.clutter else [f"--clutter {crowd.clutter:g}"]
-    options += [] if crowd.measured == default.measured else [f"--measured {crowd.measured}"]
+    options += [] if crowd.measured == default.measured else [f"--measurement {crowd.measured}"]
     options += [] if crowd.num_steps == default.num_steps else [f"--steps {crowd.num_steps}"]
     return f"vedette crowd {' '.join(options)}"
 
