@@ -67,7 +67,7 @@ def test_no_turn_is_found_where_nothing_turns(seed: int) -> None:
     assert found_turn(times[:10], rng.uniform(-math.pi, math.pi, 10)) is None
 
 
-@pytest.mark.parametrize(("scan_window", "warned"), [(4.0, True), (0.0, False), (0.1, False)])
+@pytest.mark.parametrize(("gather", "warned"), [(4.0, True), (0.0, False), (0.1, False)])
 def test_rows_grouped_over_too_long_a_time_warn(tmp_path: Path, gather: float, warned: bool) -> None:
     flights = Flights(np.random.default_rng(4), 6, 0.0)
     write(tmp_path, {"R": flights.rows((0.0, 0.0), Turn(4.0), 0.0, True)}, {"R": (0.0, 0.0)})
