@@ -219,7 +219,7 @@ def test_what_is_no_results_folder_is_named(folder, tmp_path):
         ({"format": "photo album"}, "got another file"),
         (
             {"format_version": 9},
-            "expected format 6; got 9, written by a later version of this program: run it again, or read it with",
+            "expected format 7; got 9, written by a later version of this program: run it again, or read it with",
         ),
         ({"seed": 8}, r"campaign\.sqlite: expected the runs of the manifest beside it"),
         ({"cells": []}, "the manifest was altered"),
@@ -240,7 +240,7 @@ def test_a_folder_of_an_earlier_version_is_named_with_what_reads_it(folder):
     manifest["sessions"][-1]["versions"]["vedette"] = "0.1.dev1"
     for number, which in ((2, "an earlier"), (7, "a later")):
         path.write_text(json.dumps({**manifest, "format_version": number}))
-        message = rf"manifest\.json: expected format 6; got {number}, written by {which} version .* vedette 0\.1\.dev1"
+        message = rf"manifest\.json: expected format 7; got {number}, written by {which} version .* vedette 0\.1\.dev1"
         with pytest.raises(InputError, match=message):
             open_results(folder)
     path.write_text(json.dumps({"format": "vedette-campaign", "format_version": 2}))
