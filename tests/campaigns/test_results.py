@@ -238,7 +238,7 @@ def test_a_folder_of_an_earlier_version_is_named_with_what_reads_it(folder):
     path = folder / "manifest.json"
     manifest = json.loads(path.read_text())
     manifest["sessions"][-1]["versions"]["vedette"] = "0.1.dev1"
-    for number, which in ((2, "an earlier"), (7, "a later")):
+    for number, which in ((2, "an earlier"), (8, "a later")):
         path.write_text(json.dumps({**manifest, "format_version": number}))
         message = rf"manifest\.json: expected format 7; got {number}, written by {which} version .* vedette 0\.1\.dev1"
         with pytest.raises(InputError, match=message):

@@ -269,7 +269,7 @@ def test_decisions_case_by_case_say_what_they_cannot_tell(kind: str, planner: An
     plan = decided(example, planner, CauchySchwarzReward(), seed=2)
     why = plan.explain()
     assert [why.of_targets, why.of_sensors, why.reward_without_sensor, why.baseline] == [None] * 4
-    assert "case by case" in why.missing["without"]
+    assert "case by case" in why.missing["reward_without_sensor"]
     assert why.runner_up is not None
     had = why.counterfactual(0, why.runner_up.actions[0])
     if planner is JointPlanner:
