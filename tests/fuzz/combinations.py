@@ -167,7 +167,7 @@ def _sensor(rng: Rng) -> Data:
     if rng.random() < 0.2:
         sensor["price"] = float(rng.uniform(-1.0, 3.0))
     if rng.random() < 0.1:
-        sensor.setdefault("scans", {})["late"] = {"max_delay": 1.0, "probability": 0.5}
+        sensor.setdefault("scans", {})["late"] = {"max_delay": 1.0, "probability": 0.5}  # type: ignore[index]
     return sensor
 
 

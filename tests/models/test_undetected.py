@@ -166,9 +166,9 @@ BAD: list[tuple[Any, str]] = [
     (lambda: UndetectedModel(GRID, 1.0, birth_rate=-1.0), "UndetectedModel.birth_rate: expected a number of at least"),
     (lambda: UndetectedModel(GRID, 1.0, speed=math.inf), "UndetectedModel.speed: expected a finite number; got inf"),
     (
-        lambda: UndetectedModel(GRID, 1.0, birth_density="sea"),
+        lambda: UndetectedModel(GRID, 1.0, birth_density="sea"),  # type: ignore[arg-type]
         "UndetectedModel.birth_density: expected uniform or boundary; got sea",
-    ),  # type: ignore[arg-type]
+    ),
     (lambda: UndetectedModel(GRID, 1.0, survival=1.5), "UndetectedModel.survival: expected a probability"),
     (lambda: UndetectedModel(GRID, 1.0).predict(np.zeros(24), -1.0, 1.0), "dt: expected a number of at least 0"),
 ]

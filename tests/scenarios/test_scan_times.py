@@ -86,5 +86,5 @@ def test_filters_that_go_on_from_each_scan_have_no_drop_outs() -> None:
     with pytest.raises(ScenarioError, match="scans: expected every step, as phd filters go on from each scan"):
         replace_fields(
             scenario,
-            {"filter": {"kind": "phd"}, "fusion": {"kind": "none"}, "sensors.*.scans.scan_loss_probability": 0.1}
+            {"filter": {"kind": "phd"}, "fusion": {"kind": "none"}, "sensors.*.scans.scan_loss_probability": 0.1},
         )

@@ -14,7 +14,7 @@ from vedette.cli import app
 from vedette.errors import InputError, ScenarioError
 from vedette.scenarios import load_scenario, renamed
 from vedette.scenarios.loading import parse_scenario
-from vedette.scenarios.overrides import with_fields
+from vedette.scenarios.overrides import replace_fields
 from vedette.scenarios.renamed import changes
 from vedette.scenarios.sensors_file import check_sensors_file
 from vedette.scenarios.upgrading import upgraded_yaml
@@ -131,7 +131,7 @@ def test_every_renamed_key_and_value_is_tried() -> None:
     tried = {(c.former, c.present) for case in CASES for c in changes(read_yaml(texts(case)[0], "f").data)}
     tried |= {("gather", "scan_window"), ("anywhere", "uniform")}  # in the tests below
     tables = (*renamed._KEYS.values(), *renamed._VALUES.values())
-    assert {pair for table in tables for pair in table.items()} <= tried
+    assert {pair for table in tables for pair in table.items()} <= tried  # type: ignore[attr-defined]
 
 
 SENSORS = """\
@@ -224,9 +224,9 @@ def test_a_shared_value_that_is_renamed_in_one_of_its_places_is_left_to_the_user
 def test_former_names_in_fields_and_options_are_named() -> None:
     scenario = load_scenario("paper-a")
     with pytest.raises(ScenarioError, match=r"now last_scan: `vedette upgrade FILE` rewrites a campaign file"):
-        with_fields(scenario, {"ospa.to_step": 9})
+        replace_fields(scenario, {"ospa.to_step": 9})
     with pytest.raises(ScenarioError, match=r"now stationary_until_first_decision: `vedette upgrade FILE`"):
-        with_fields(scenario, {"sensors.*.moves_from": "start"})
+        replace_fields(scenario, {"sensors.*.moves_from": "start"})
     done = CliRunner().invoke(app, ["run", "paper-a", "--planner", "fixed"])
     assert done.exit_code == 2
     assert "got 'fixed' (now constant)" in " ".join(done.stderr.split())

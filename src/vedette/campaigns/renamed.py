@@ -12,7 +12,7 @@ from typing import Any
 from vedette.campaigns.spec import MOST_BYTES, parse_toml
 from vedette.errors import InputError
 from vedette.internal.reading import read_text
-from vedette.scenarios.faults import Path as Keys
+from vedette.scenarios.diagnostics import Path as Keys
 from vedette.scenarios.renamed import STRATEGIES, Change, changed, changes, present_key
 from vedette.scenarios.upgrading import Line, line_of, replace_text
 

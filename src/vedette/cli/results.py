@@ -158,9 +158,9 @@ def _upgrade_file(path: Path) -> None:
         from vedette.scenarios.upgrading import upgrade_scenario_file as upgrade_file
     lines = upgrade_file(path)
     for line in lines:
-        say(str(line))
-    say(f"{path}: {pluralise(len(lines), 'change')}" if lines else f"{path}: up to date; nothing was changed")
-    publish({"file": path, "changes": [line._asdict() for line in lines]})
+        echo(str(line))
+    echo(f"{path}: {pluralise(len(lines), 'change')}" if lines else f"{path}: up to date; nothing was changed")
+    emit_json({"file": path, "changes": [line._asdict() for line in lines]})
 
 
 def _upgrade_folder(folder: Path) -> None:

@@ -92,7 +92,13 @@ def _sensors(plan: Plan, explanation: Explanation) -> list[tuple[int, str, float
     return [
         (s, describe_action(rounded(own.columns, own.values[chosen])), _number(share), _number(without))
         for s, (own, chosen, share, without) in enumerate(
-            zip(plan.actions, plan.chosen, explanation.of_sensors.tolist(), explanation.reward_without_sensor.tolist(), strict=True)
+            zip(
+                plan.actions,
+                plan.chosen,
+                explanation.of_sensors.tolist(),
+                explanation.reward_without_sensor.tolist(),
+                strict=True,
+            )
         )
     ]
 

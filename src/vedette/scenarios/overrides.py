@@ -9,8 +9,8 @@ from typing import Any
 from vedette.errors import ScenarioError
 from vedette.scenarios.diagnostics import Path, format_path, shown_key
 from vedette.scenarios.loading import Scenario, diagnose
-from vedette.scenarios.validation import suggestion
 from vedette.scenarios.renamed import present_key
+from vedette.scenarios.validation import suggestion
 from vedette.scenarios.yaml_reader import Document
 
 ALL_ITEMS = "*"

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, NamedTuple
 
-from vedette.scenarios.faults import Path
+from vedette.scenarios.diagnostics import Path
 
 # Section -> former key -> present key. Sections are paths with the present names; `*` is any key or item, and SENSOR an
 # item of `sensors` or `sensor_defaults`.

@@ -13,9 +13,9 @@ from typing import NamedTuple
 from vedette.errors import InputError, ScenarioError
 from vedette.internal.files import write_file
 from vedette.internal.reading import read_text
-from vedette.scenarios.faults import format_path
+from vedette.scenarios.diagnostics import format_path
 from vedette.scenarios.renamed import Change, changed, changes
-from vedette.scenarios.yaml_reader import MOST_BYTES, Document, read_yaml
+from vedette.scenarios.yaml_reader import MAX_BYTES, Document, read_yaml
 
 _LINE = re.compile(r"\r\n|[\n\r]")
 _PROPERTIES = r"(?:[&!]\S*\s+)*"  # anchor and tag of a YAML node
@@ -111,7 +111,7 @@ def upgrade_scenario_file(path: FilePath) -> list[Line]:
     The file is replaced as a whole, or not at all if it is up to date. Raises as `upgraded_yaml`, and `InputError` for
     a file that cannot be read or written.
     """
-    text, lines = upgraded_yaml(read_text(path, "scenario file", MOST_BYTES), str(path))
+    text, lines = upgraded_yaml(read_text(path, "scenario file", MAX_BYTES), str(path))
     if lines:
         replace_text(path, text)
     return lines

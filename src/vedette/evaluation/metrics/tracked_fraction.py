@@ -70,7 +70,9 @@ class TrackedFraction:
     def __call__(self, record: RunRecord) -> Floats:
         """Return the share, (num_scans,); raise `InputError` as `match_run` does, and for another number of sensors."""
         truth = record.truth
-        in_view = targets_in_view(truth, record.poses, self.sensors, min_detection_probability=self.min_detection_probability)
+        in_view = targets_in_view(
+            truth, record.poses, self.sensors, min_detection_probability=self.min_detection_probability
+        )
         matching = match_run(truth, record.estimates, cutoff=self.cutoff, order=self.order)
         tracked = np.zeros(len(in_view), np.bool_)
         tracked[matching.truth_rows] = True

@@ -96,7 +96,9 @@ def _check_custom_parts(scenario: Scenario, section: Sensor, sensor: SensorModel
     if has_measured_births and sensor.measurement.places is None and isinstance(measured, Custom):
         expected = f"{measured.function} to give a measurement with `places`, as targets are born of measurements"
         raise MissingMember(measured, "function", expected, "one without")
-    may_skip_scans = section.scans.scan_loss_probability or section.scans.late or not section.scans.build(model.time).all()
+    may_skip_scans = (
+        section.scans.scan_loss_probability or section.scans.late or not section.scans.build(model.time).all()
+    )
     may_skip_scans = may_skip_scans or section.switchable or (model.network is not None and model.network.delay)
     if (
         isinstance(model.filter, CustomFilter)

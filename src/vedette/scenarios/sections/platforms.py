@@ -142,7 +142,9 @@ class Camera(_PlatformSection):
 
         pointing: Platform = super().build(folder)
         return (
-            pointing if isinstance(self.platform, Stationary) else MountedPlatform(self.platform.build(folder), pointing)
+            pointing
+            if isinstance(self.platform, Stationary)
+            else MountedPlatform(self.platform.build(folder), pointing)
         )
 
     def components(self) -> Row:
