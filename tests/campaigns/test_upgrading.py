@@ -122,7 +122,8 @@ def test_former_names_are_replaced_everywhere(tmp_path: Path) -> None:
     assert results.campaign.spec["set"]["ospa.last_scan"] == 5
     assert fixed.scenario.model.sensors[0].platform.kind == "heading"
     assert load_scenario(saved / "scenario.yaml").model == results.campaign.cells[0].scenario.model
-    assert results.manifest["digest"] == results.campaign.digest() != before["digest"]
+    texts = [cell["scenario"] for cell in results.manifest["cells"]]
+    assert results.manifest["digest"] == results.campaign.digest(texts) != before["digest"]
     why, twin = (each.decisions[0].plan.explanation for each in (record, results.record("jdm", 0)))
     assert why is not None
     assert twin is not None

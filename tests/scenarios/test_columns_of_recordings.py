@@ -36,11 +36,11 @@ def add_column(file: Path, name: str) -> None:
 def test_columns_that_are_not_used_are_named(tmp_path: Path) -> None:
     write_recording(tmp_path, seconds=40.0)
     assert told(made(tmp_path), "not used") == []
-    for name in ("range_std_m", "class"):
+    for name in ("snr_db", "class"):
         add_column(tmp_path / "scans.csv", name)
     add_column(tmp_path / "truth.csv", "length")
     first, second = told(made(tmp_path), "not used")
-    assert first.endswith("scans.csv: not used: 2 columns (range_std_m, class)")
+    assert first.endswith("scans.csv: not used: 2 columns (snr_db, class)")
     assert second.endswith("truth.csv: not used: 1 column (length)")
 
 
