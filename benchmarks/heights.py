@@ -15,13 +15,12 @@ one of two.
 
 from __future__ import annotations
 
-import argparse
 import math
 import tempfile
 from pathlib import Path
 
 import numpy as np
-from pages import write_between
+from pages import table_of_scenes
 
 from vedette.evaluation import track_recording
 from vedette.kernels.base.types import Floats
@@ -140,18 +139,5 @@ def table(runs: int, first: int) -> str:
     return "\n".join(lines)
 
 
-def main() -> None:
-    """Print the table, or write it into a page."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--runs", type=int, default=20, help="scenes of each kind")
-    parser.add_argument("--first", type=int, default=0, help="seed of the first")
-    parser.add_argument("--write", type=Path, help="page to write the table into")
-    given = parser.parse_args()
-    found = table(given.runs, given.first)
-    print(found)
-    if given.write is not None:
-        write_between(given.write, "heights.py", found)
-
-
 if __name__ == "__main__":
-    main()
+    table_of_scenes(__doc__, "heights.py", table)

@@ -16,7 +16,6 @@ in units of the belief's covariance, which is 1.39 if it is right (2.37 with a h
 
 from __future__ import annotations
 
-import argparse
 import math
 import tempfile
 from pathlib import Path
@@ -24,7 +23,7 @@ from typing import NamedTuple
 
 import numpy as np
 from heights import Aircraft
-from pages import write_between
+from pages import table_of_scenes
 
 from vedette.evaluation import track_recording
 from vedette.kernels.base.types import Floats
@@ -193,18 +192,5 @@ def table(runs: int, first: int) -> str:
     return "\n".join(lines)
 
 
-def main() -> None:
-    """Print the table, or write it into a page."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--runs", type=int, default=20, help="scenes a row")
-    parser.add_argument("--first", type=int, default=0, help="seed of the first")
-    parser.add_argument("--write", type=Path, help="page to write the table into")
-    given = parser.parse_args()
-    found = table(given.runs, given.first)
-    print(found)
-    if given.write is not None:
-        write_between(given.write, "plot_accuracy.py", found)
-
-
 if __name__ == "__main__":
-    main()
+    table_of_scenes(__doc__, "plot_accuracy.py", table)

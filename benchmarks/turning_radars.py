@@ -14,13 +14,12 @@ the belief's covariance, 1.39 for a Gaussian of two dimensions that is right.
 
 from __future__ import annotations
 
-import argparse
 import math
 import tempfile
 from pathlib import Path
 
 import numpy as np
-from pages import write_between
+from pages import table_of_scenes
 
 from vedette.evaluation import track_recording
 from vedette.kernels.base.types import Floats
@@ -149,18 +148,5 @@ def table(runs: int, first: int) -> str:
     return "\n".join(lines)
 
 
-def main() -> None:
-    """Measure, print, and write into a page."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--runs", type=int, default=20)
-    parser.add_argument("--first", type=int, default=0)
-    parser.add_argument("--write", type=Path)
-    args = parser.parse_args()
-    text = table(args.runs, args.first)
-    print(text)
-    if args.write is not None:
-        write_between(args.write, "turning_radars.py", text)
-
-
 if __name__ == "__main__":
-    main()
+    table_of_scenes(__doc__, "turning_radars.py", table)
