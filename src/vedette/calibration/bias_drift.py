@@ -16,7 +16,7 @@ from vedette.internal.quantities import COMPONENTS
 from vedette.kernels.base.types import Floats
 from vedette.kernels.gaussian.row_noise import row_length
 from vedette.models.arguments import float_array, instance, positive
-from vedette.recorded.scan_times import RecordedScan, group_by_time, remove_bias
+from vedette.recorded.scan_times import RecordedScan, group_by_time, poses_at_sites, remove_bias
 from vedette.tracking import SensorScan
 from vedette.tracking.out_of_sequence import copy_scan, scan_name
 
@@ -153,7 +153,7 @@ class OnlineBiasEstimator:
         return state, self.corrected(state, scan)
 
     def corrected(self, state: BiasEstimatorState, scan: SensorScan) -> SensorScan:
-        """Return the scan without the biases estimated for its time; raises as `take`."""
+        """Return the scan without the biases estimated for its time; raises as `process`."""
         own = self._checked(scan)
         site = self.problem.with_biases(self.biases(state, own.time))[own.sensor]
         recorded_scan = RecordedScan(own.time, own.sensor, own.measurements, own.pose)
@@ -193,19 +193,7 @@ class OnlineBiasEstimator:
         recorded_scans = [
             RecordedScan(each.time - start, each.sensor, each.measurements, each.pose) for each in state.scans
         ]
-        sites = self.problem.sites
-        poses = np.zeros(
-            (
-                len(sites),
-                max(
-                    map(
-                        len, [*(site.pose for site in sites), *(recorded_scan.pose for recorded_scan in recorded_scans)]
-                    )
-                ),
-            )
-        )
-        for s, site in enumerate(sites):
-            poses[s, : len(site.pose)] = site.pose
+        poses = poses_at_sites(self.problem.sites, recorded_scans)
         window = group_by_time(recorded_scans, poses, start, recorded.is_utc, (), recorded.bearings)
         problem = replace(self.problem, recording=window, parameters=state.parameters)
         drifts = [each for each in state.parameters if each.kind == "bias" and each.component != "clock"]

@@ -79,8 +79,9 @@ def match_measurements(
                 continue
             pairs = _assigned(scan, means[:, :2] - poses[s, :2], poses[s, :2], sites[s].kind, stds[s])
             counts[:, s] += len(means) - len(pairs), len(scan) - len(pairs), 1
+            own = measured_part(scan, len(COMPONENTS[sites[s].kind])).tolist()
             for i, j in pairs:
-                measured = (*measured_part(scan, len(COMPONENTS[sites[s].kind]))[i].tolist(), math.nan)[:2]
+                measured = (*own[i], math.nan)[:2]
                 rows.append((time, s, labels[j], *measured, *poses[s, :2].tolist(), *means[j].tolist()))
         state = tracker.step(state, list(scans), poses, time, rngs=rngs)[0]
     table = np.array(rows, np.float64).reshape(len(rows), 11)

@@ -198,7 +198,7 @@ class _TcpClient:
 
 
 class TcpServer:
-    """TCP server of an line_server; each client first sends `{"token": "..."}` if a token is needed."""
+    """TCP server of a line server; each client first sends `{"token": "..."}` if a token is needed."""
 
     def __init__(self, line_server: LineServer) -> None:
         self._line_server = line_server

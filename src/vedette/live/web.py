@@ -75,7 +75,7 @@ class _Socket(ServerConnection):
 
 
 class WebServer:
-    """WebSocket and page server of an line_server.
+    """WebSocket and page server of a line server.
 
     Frames are drawn at most ten times a second, once for all pages, and only if there are pages. A page gets the next
     frame after it has acknowledged the last one; a slow page misses some, and receives the number it missed.

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -92,6 +93,21 @@ class SignalModel:
         exact = max(power - threshold, 0.0) * (1.0 / clutter - 1.0 / target) - math.log(target / clutter)
         # log of 1 / (share + (1 - share) / ratio)
         return -float(np.logaddexp(math.log(_STRONG_CLUTTER), math.log1p(-_STRONG_CLUTTER) - exact))
+
+
+def row_noise(
+    stds: Sequence[float], missing: Sequence[bool], *, correlation: float = 0.0, log_likelihood_ratio: float = 0.0
+) -> tuple[float, ...]:
+    """Return what follows a measurement in its row, as in `with_row_noise`.
+
+    stds: of each component, 0 for that of the sensor's noise model. missing: of each component, True if it was not
+    measured. correlation: of the first two components.
+    """
+    own = [math.sqrt(MISSING) if gap else std for std, gap in zip(stds, missing, strict=True)]
+    covs = [own[a] * own[b] if a == b else 0.0 for a in range(len(own)) for b in range(a + 1)]
+    if correlation:
+        covs[1] = correlation * own[0] * own[1]
+    return (*covs, LOG_RATIO_OF_MISSING * sum(missing) + log_likelihood_ratio)
 
 
 def measured_part(scan: Floats, meas_dim: int) -> Floats:

@@ -37,9 +37,9 @@ class ScanColumns:
         self._numbers = {site.name: s for s, site in enumerate(sites)} | {
             str(s): s - 1 for s in range(1, len(sites) + 1) if str(s) not in {site.name for site in sites}
         }
-        self._with_gaps = {name for name in GAPS if name in self._columns and self._has_gaps(name)}
         self.is_utc = are_dates(table.columns[self._time])
         self._check()
+        self.accuracy = tuple(map(self._accuracy, sites))
 
     def service_of(self, sensor: int) -> RadarService | None:
         """Return the turn of a sensor by its service messages; None without any."""
@@ -56,10 +56,6 @@ class ScanColumns:
         columns = (self.table.columns[self._columns[name][0]] for name in names)
         return any(is_empty(cell) and not all(map(is_empty, others)) for cell, *others in zip(*columns, strict=True))
 
-    def rows_bring_noise(self, site: RecordedSensor) -> bool:
-        """Return True if the rows of a sensor have their own noise, or miss a component of the measurement."""
-        return bool(self.own_accuracy(site)) or not self._with_gaps.isdisjoint(COMPONENTS[site.kind])
-
     @property
     def unused(self) -> tuple[str, ...]:
         """Columns that are not read."""
@@ -68,17 +64,22 @@ class ScanColumns:
         own = {"own_x", "own_y", "own_lon", "own_lat", "own_heading"}
         own |= {*OWN_SPEEDS} if any(is_doppler(site.kind) for site in self.sites) else set()
         own |= {"own_height"} if any(site.kind in HEIGHT_DEPENDENT for site in self.sites) else set()
-        own |= {name for site in self.sites for name in self.own_accuracy(site)}
+        own |= {name for names in self.accuracy for name in names or ()}
         used = {self._columns[name][0] for name in measured | own if name in self._columns} | {self._time, self._sensor}
         return tuple(name for name in self.table.columns if name not in used)
 
-    def own_accuracy(self, site: RecordedSensor) -> tuple[str, ...]:
-        """Return the columns with the accuracy and signal-to-noise ratio of the rows of a sensor."""
+    def _accuracy(self, site: RecordedSensor) -> tuple[str, ...] | None:
+        """Return the columns with accuracy and signal-to-noise ratio of the rows of a sensor.
+
+        None if its rows bring no noise: without such columns, and with all components of the measurement.
+        """
         names = [f"{name}_std" for name in COMPONENTS[site.kind]]
         if {"x_std", "y_std"} <= set(self._columns):
             names += ["xy_correlation"] * is_position(site.kind)
         names += ["snr"] * (site.signal is not None)
-        return tuple(name for name in names if name in self._columns)
+        own = tuple(name for name in names if name in self._columns)
+        has_gaps = any(self._has_gaps(name) for name in COMPONENTS[site.kind] if name in GAPS)
+        return own if own or has_gaps else None
 
     def without_velocity(self, poses: Floats) -> tuple[str, ...]:
         """Return a note of each moving sensor that measures range rates but has no columns of its velocity.

@@ -169,6 +169,15 @@ class RecordedScan(NamedTuple):
     pose: Floats
 
 
+def poses_at_sites(sites: Sequence[RecordedSensor], recorded_scans: Sequence[RecordedScan]) -> Floats:
+    """Return the poses of the sensors' sites, (num_sensors, longest pose of sites and scans), zeros behind them."""
+    sizes = [*(len(site.pose) for site in sites), *(len(scan.pose) for scan in recorded_scans)]
+    poses = np.zeros((len(sites), max(sizes)))
+    for s, site in enumerate(sites):
+        poses[s, : len(site.pose)] = site.pose
+    return poses
+
+
 def group_by_time(
     recorded_scans: Iterable[RecordedScan],
     poses: Floats,

@@ -21,9 +21,8 @@ from vedette.internal.quantities import (
 )
 from vedette.internal.text import shown
 from vedette.kernels.base.types import OWN_HEIGHT, OWN_VELOCITY, Floats
-from vedette.kernels.gaussian.row_noise import MISSING
 from vedette.models.bias import NO_BIAS
-from vedette.models.row_noise import LOG_RATIO_OF_MISSING
+from vedette.models.row_noise import row_noise
 from vedette.recorded.columns import ScanColumns
 from vedette.recorded.conventions import (
     GAPS,
@@ -42,6 +41,7 @@ from vedette.recorded.scan_times import (
     RecordedScans,
     RecordedSensor,
     group_by_time,
+    poses_at_sites,
     remove_biases,
     turned,
 )
@@ -175,35 +175,33 @@ class _Rows(ScanColumns):
             return None
         if quantities[0] == "lon":
             place = self._agreed(i, self._plane(i, "lon", "lat"), "x", "y")
-            return (*place, *(self._third(i, quantity) for quantity in quantities[2:]), *self._row_noise(i, site))
+            return (*place, *(self._third(i, quantity) for quantity in quantities[2:]), *self._row_noise(i, s))
         measured = (
             self._angle(i, quantity, s, pose) if quantity == "bearing" else self._third(i, quantity)
             for quantity in quantities
         )
-        return (*measured, *self._row_noise(i, site))
+        return (*measured, *self._row_noise(i, s))
 
     def _third(self, i: int, quantity: str) -> float:
         """Return a measured value; of a third component that the row does not have, what stands in for it."""
         return GAPS[quantity] if quantity in GAPS and self._is_blank(i, quantity) else self._value(i, quantity)
 
-    def _row_noise(self, i: int, site: RecordedSensor) -> tuple[float, ...]:
+    def _row_noise(self, i: int, s: int) -> tuple[float, ...]:
         """Return covariance and log likelihood ratio of a row in the order of `row_noise`; () for rows without them."""
-        if not self.rows_bring_noise(site):
+        own, signal = self.accuracy[s], self.sites[s].signal
+        if own is None:
             return ()
-        own = self.own_accuracy(site)
-        names = COMPONENTS[site.kind]
+        names, correlation, ratio = COMPONENTS[self.sites[s].kind], 0.0, 0.0
         missing = [name in GAPS and self._is_blank(i, name) for name in names]
         stds = [
-            math.sqrt(MISSING) if gap else self._std(i, f"{name}_std") if f"{name}_std" in own else 0.0
+            self._std(i, f"{name}_std") if f"{name}_std" in own and not gap else 0.0
             for name, gap in zip(names, missing, strict=True)
         ]
-        covs = [stds[a] * stds[b] if a == b else 0.0 for a in range(len(names)) for b in range(a + 1)]
         if "xy_correlation" in own and not self._is_blank(i, "xy_correlation"):
-            covs[1] = self._correlation(i) * stds[0] * stds[1]
-        ratio = LOG_RATIO_OF_MISSING * sum(missing)
-        if site.signal is not None and "snr" in own and not self._is_blank(i, "snr"):
-            ratio += site.signal.log_likelihood_ratio(self._value(i, "snr"))
-        return (*covs, ratio)
+            correlation = self._correlation(i)
+        if signal is not None and "snr" in own and not self._is_blank(i, "snr"):
+            ratio = signal.log_likelihood_ratio(self._value(i, "snr"))
+        return row_noise(stds, missing, correlation=correlation, log_likelihood_ratio=ratio)
 
     def _is_blank(self, i: int, quantity: str) -> bool:
         return is_empty(self.table.columns[self._columns[quantity][0]][i])
@@ -241,9 +239,7 @@ class _Rows(ScanColumns):
 
     def _agreed(self, i: int, place: tuple[float, ...], x: str, y: str) -> tuple[float, ...]:
         """Return a place given in degrees; raises if the row has one in metres, too, that does not agree."""
-        if not {x, y} <= set(self._columns) or any(
-            is_empty(self.table.columns[self._columns[name][0]][i]) for name in (x, y)
-        ):
+        if not {x, y} <= set(self._columns) or self._is_blank(i, x) or self._is_blank(i, y):
             return place
         apart = math.hypot(self._value(i, x) - place[0], self._value(i, y) - place[1])
         if apart > ONE_PLACE + ONE_PLACE_SHARE * math.hypot(*place):
@@ -304,10 +300,7 @@ def _at_instants(rows: list[_Row], how: _Rows, skipped: tuple[str, ...]) -> Reco
         for group in groups:
             time = math.fsum(row.time for row in group) / len(group) if window > 0.0 else group[0].time
             looks.append(RecordedScan(time, s, _scan(group, site), np.array(group[-1].pose)))
-    first = np.zeros((len(sites), max([*map(len, (site.pose for site in sites)), *(len(look.pose) for look in looks)])))
-    for s, site in enumerate(sites):
-        first[s, : len(site.pose)] = site.pose
-    found = group_by_time(looks, first, 0.0, how.is_utc, skipped, how.bearings)
+    found = group_by_time(looks, poses_at_sites(sites, looks), 0.0, how.is_utc, skipped, how.bearings)
     return replace(found, gathered=tuple(spans))
 
 
