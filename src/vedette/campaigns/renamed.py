@@ -14,7 +14,7 @@ from vedette.errors import InputError
 from vedette.internal.reading import read_text
 from vedette.scenarios.diagnostics import Path as Keys
 from vedette.scenarios.renamed import STRATEGIES, Change, changed, changes, present_key
-from vedette.scenarios.upgrading import Line, line_of, replace_text
+from vedette.scenarios.upgrading import Line, line_of, upgrade_text_file
 
 
 def present_field(field: str) -> str:
@@ -105,7 +105,4 @@ def upgrade_campaign_file(path: Path) -> list[Line]:
     The file is replaced as a whole, or not at all if it is up to date. Raises as `upgraded_toml`, and `InputError` for
     a file that cannot be read or written.
     """
-    text, lines = upgraded_toml(read_text(path, "campaign file", MOST_BYTES), str(path))
-    if lines:
-        replace_text(path, text)
-    return lines
+    return upgrade_text_file(path, read_text(path, "campaign file", MOST_BYTES), upgraded_toml)

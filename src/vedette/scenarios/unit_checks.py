@@ -26,7 +26,7 @@ _MAX_PERIOD_SCANS = 3.0
 
 
 def implausible_settings(model: ScenarioModel) -> Iterator[tuple[Path, str]]:
-    """Yield places in the scenario and texts with what was expected, what was given and the probable mistake."""
+    """Yield places in the scenario and texts with the expected and the given value and the probable mistake."""
     yield from _bearings(model)
     yield from _biases(model)
     yield from _areas(model)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import re
 from codecs import BOM_UTF8
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from functools import reduce
 from pathlib import Path as FilePath
 from typing import NamedTuple
@@ -111,13 +111,17 @@ def upgrade_scenario_file(path: FilePath) -> list[Line]:
     The file is replaced as a whole, or not at all if it is up to date. Raises as `upgraded_yaml`, and `InputError` for
     a file that cannot be read or written.
     """
-    text, lines = upgraded_yaml(read_text(path, "scenario file", MAX_BYTES), str(path))
-    if lines:
-        replace_text(path, text)
-    return lines
+    return upgrade_text_file(path, read_text(path, "scenario file", MAX_BYTES), upgraded_yaml)
 
 
-def replace_text(path: FilePath, text: str) -> None:
-    """Replace a file of UTF-8 text as a whole; a byte order mark stays. Raises `InputError` if this fails."""
+def upgrade_text_file(path: FilePath, text: str, upgraded: Callable[[str, str], tuple[str, list[Line]]]) -> list[Line]:
+    """Replace the text of a file by its upgraded form, and return the changes; without any the file stays as it is.
+
+    The file is UTF-8; a byte order mark stays. Raises `InputError` if it cannot be written, and as `upgraded`.
+    """
+    text, lines = upgraded(text, str(path))
+    if not lines:
+        return lines
     mark = BOM_UTF8 if path.read_bytes().startswith(BOM_UTF8) else b""
     write_file(path, lambda file: file.write(mark + text.encode()))
+    return lines

@@ -55,7 +55,7 @@ class NamedJointWithTruth(NamedJoint):
     kind: Literal["true_targets"] = Field(default="true_targets", description="Kind of planner [-].")  # type: ignore[assignment]
 
     def incompatibility(self, model: ScenarioModel, *, labels: bool | None = None) -> str:
-        """Return what is required instead, also if true targets are unknown or lack components of a custom motion."""
+        """Return the requirement not met, also if true targets are unknown or lack components of a custom motion."""
         return super().incompatibility(model, labels=labels) or missing_truth(model)
 
     def description(self, model: ScenarioModel) -> str:
@@ -142,7 +142,7 @@ class NamedOracle(Strategy, Derived):
     kind: Literal["oracle"] = Field(default="oracle", description="Kind of planner [-].")
 
     def incompatibility(self, model: ScenarioModel, *, labels: bool | None = None) -> str:
-        """Return what is required instead if true targets are unknown or lack components of a custom motion."""
+        """Return the requirement that is not met if true targets are unknown or lack components of a custom motion."""
         return missing_truth(model)
 
     def description(self, model: ScenarioModel) -> str:

@@ -56,7 +56,7 @@ class Strategy(Section):
     needs_labels: ClassVar[bool] = False
 
     def incompatibility(self, model: ScenarioModel, *, labels: bool | None = None) -> str:
-        """Return what is required instead, and why, if the planner does not suit a scenario; "" if it does.
+        """Return the requirement that is not met, and why, if the planner does not suit a scenario; "" if it does.
 
         labels: True if the filter, already built, labels its targets; None: determined from its kind.
         """
@@ -78,7 +78,7 @@ class ValuedStrategy(Strategy):
     needs_labels: ClassVar[bool] = True
 
     def incompatibility(self, model: ScenarioModel, *, labels: bool | None = None) -> str:
-        """Return what is required instead if filters have no labels, which the values need."""
+        """Return the requirement that is not met if filters have no labels, which the values need."""
         kind = model.filter.kind
         if kind not in UNLABELLED if labels is None else labels:
             return ""
@@ -106,7 +106,7 @@ class LookaheadStrategy(ValuedStrategy):
         return parts.lookahead
 
     def incompatibility(self, model: ScenarioModel, *, labels: bool | None = None) -> str:
-        """Return what is required instead, also if decisions are not sums over labels."""
+        """Return the requirement that is not met, also if decisions are not sums over labels."""
         reward = self.reward or model.control.reward
         if unfit := super().incompatibility(model, labels=labels):
             return unfit
@@ -126,7 +126,7 @@ class LookaheadStrategy(ValuedStrategy):
 
 
 def missing_truth(model: ScenarioModel) -> str:
-    """Return what is required instead of a planner that uses true targets; "" if these are known completely."""
+    """Return the requirement of a planner that uses true targets; "" if these are known completely."""
     motion = model.motion
     if model.targets.kind == "unknown":
         return "one that does not know the targets, as these are unknown"
