@@ -15,7 +15,7 @@ from vedette.errors import ModelError
 from vedette.kernels.base.compile import borrowing, inlined, kernel
 from vedette.kernels.base.types import Floats, Ints, Lmb, Mixture, Motion, ScanInput, Sensor, Tracks
 from vedette.kernels.gaussian.components import borrowed_components, copy_component, copy_components, make_components
-from vedette.kernels.gaussian.innovation import Innovation, copy_innovation, expect, make_innovation
+from vedette.kernels.gaussian.innovation import Innovation, expect, make_innovation
 from vedette.kernels.gaussian.linalg import log_add
 from vedette.kernels.gaussian.prediction import predict
 from vedette.kernels.gaussian.scratch import Scratch, make_scratch
@@ -162,24 +162,3 @@ def standing_rows(tracks: Tracks, meas_dim: int) -> Rows:
         rows.log_absent[i], rows.offsets[i + 1] = -math.inf, tracks.offsets[i + 1]
     copy_components(tracks.components, 0, num, rows.components, 0)
     return rows
-
-
-@kernel
-def taken_rows(rows: Rows, members: Ints) -> Rows:
-    """Return some of the rows, in the order given."""
-    num_components = 0
-    for row in members:
-        num_components += rows.offsets[row + 1] - rows.offsets[row]
-    meas_dim, state_dim = rows.innovation.whitened_cross.shape[1:]
-    out, end = make_rows(len(members), num_components, state_dim, meas_dim), 0
-    components, taken = rows.components, out.components
-    for i in range(len(members)):
-        row = members[i]
-        out.labels[i, 0], out.labels[i, 1] = rows.labels[row, 0], rows.labels[row, 1]
-        out.log_absent[i] = rows.log_absent[row]
-        for c in range(rows.offsets[row], rows.offsets[row + 1]):
-            copy_component(components, c, taken, end)
-            copy_innovation(rows.innovation, c, out.innovation, end)
-            end += 1
-        out.offsets[i + 1] = end
-    return out

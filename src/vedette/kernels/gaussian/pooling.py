@@ -9,7 +9,13 @@ import numpy as np
 
 from vedette.kernels.base.compile import borrowing, inlined, kernel
 from vedette.kernels.base.types import Floats, Ints, Mixture, Tracks
-from vedette.kernels.gaussian.components import copy_component, make_components, merge_components, own_components
+from vedette.kernels.gaussian.components import (
+    copy_component,
+    copy_gaussian,
+    make_components,
+    merge_components,
+    own_components,
+)
 from vedette.kernels.gaussian.mixtures import moment_match, require_gaussians
 from vedette.kernels.gaussian.reduction import MixtureCaps, make_reduction_work, reduce_into
 
@@ -29,6 +35,9 @@ def moments_of(tracks: Tracks, first: int, last: int) -> Moments:
     out = Moments(np.empty((last - first, dim)), np.empty((last - first, dim, dim)))
     for i in range(last - first):
         start, end = tracks.offsets[first + i], tracks.offsets[first + i + 1]
+        if end - start == 1:  # most tracks
+            copy_gaussian(components.means, components.covs, start, out.means, out.covs, i)
+            continue
         moment_match(
             components.log_weights[start:end],
             components.means[start:end],

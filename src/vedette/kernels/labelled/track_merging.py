@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from vedette.kernels.base.arrays import counted_ints, filled_ints, group_members
-from vedette.kernels.base.compile import kernel
+from vedette.kernels.base.compile import borrowing, kernel
 from vedette.kernels.base.types import Floats, Glmb, Ints, Tracks
 from vedette.kernels.gaussian.distances import l1_bound
 from vedette.kernels.gaussian.linalg import cholesky, log_sum, solve_lower
@@ -20,7 +20,7 @@ from vedette.kernels.gaussian.mixtures import descending_order
 from vedette.kernels.gaussian.pooling import Moments, moments_of, pooled_tracks
 from vedette.kernels.gaussian.reduction import MixtureCaps
 from vedette.kernels.labelled.groups import group_log_sums
-from vedette.kernels.labelled.splitting import Choices, choices_of, group_choices
+from vedette.kernels.labelled.splitting import Choices, group_choices
 
 
 class _Pairs(NamedTuple):
@@ -30,47 +30,94 @@ class _Pairs(NamedTuple):
     heavier: Ints  # (num_tracks,)
 
 
+class _Work(NamedTuple):
+    """Working arrays for the versions of one label."""
+
+    versions: Ints  # (num_tracks,) heaviest first
+    means: Floats  # (num_tracks, state_dim) of each version, and of its variances the inverses and logs
+    inverses: Floats
+    logs: Floats
+    factor: Floats  # (state_dim, state_dim)
+    offset: Floats  # (state_dim,)
+
+
 @kernel
-def _likeliest_heavier(versions: Ints, weights: Floats, moments: Moments) -> Ints:
-    """Place of the heavier version with probably the least merging cost, -1 for none, shape (num_versions,).
+def _make_work(num: int, dim: int) -> _Work:
+    return _Work(
+        np.empty(num, np.int64),
+        np.empty((num, dim)),
+        np.empty((num, dim)),
+        np.empty((num, dim)),
+        np.empty((dim, dim)),
+        np.empty(dim),
+    )
+
+
+@borrowing
+def _versions_of(labels: Ints, step: int, index: int, weights: Floats, versions: Ints) -> int:
+    """Write the tracks of a label, heaviest first; return their number."""
+    count = 0
+    for track in range(len(weights)):
+        if labels[track, 0] != step or labels[track, 1] != index:
+            continue
+        slot = count
+        while slot > 0 and weights[versions[slot - 1]] < weights[track]:
+            versions[slot] = versions[slot - 1]
+            slot -= 1
+        versions[slot] = track
+        count += 1
+    return count
+
+
+@borrowing
+def _write_diagonals(count: int, moments: Moments, work: _Work) -> None:
+    """Write the means, inverse variances and log variances of the first `count` versions."""
+    for k in range(count):
+        version = work.versions[k]
+        for a in range(moments.means.shape[1]):
+            variance = moments.covs[version, a, a]
+            work.means[k, a], work.inverses[k, a] = moments.means[version, a], 1.0 / variance
+            work.logs[k, a] = math.log(variance)
+
+
+@borrowing
+def _likeliest_heavier(k: int, weights: Floats, work: _Work) -> int:
+    """Return the place of the heavier version with probably the least merging cost for version `k`, -1 for none.
 
     Uses only diagonals: for near Gaussians the squared L1 distance grows as sum d^2 / P + (log P - log Q)^2 / 2.
     """
-    num, dim = len(versions), moments.means.shape[1]
-    means, inverses, logs = np.empty((num, dim)), np.empty((num, dim)), np.empty((num, dim))
-    for k in range(num):
-        for a in range(dim):
-            variance = moments.covs[versions[k], a, a]
-            means[k, a], inverses[k, a], logs[k, a] = moments.means[versions[k], a], 1.0 / variance, math.log(variance)
-    found = filled_ints(num, -1)
-    for k in range(1, num):
-        least, weight = math.inf, weights[versions[k]]
-        for i in range(k):
-            gap = 0.0
-            for a in range(dim):
-                offset, ratio = means[k, a] - means[i, a], logs[k, a] - logs[i, a]
-                gap += offset * offset * inverses[i, a] + 0.5 * ratio * ratio
-            # For weights v <= w only w / (v + w) differs between heavier versions.
-            share = weights[versions[i]] / (weights[versions[i]] + weight) if weight > 0.0 else 1.0
-            if share * share * gap < least:
-                least, found[k] = share * share * gap, i
+    if k == 1:
+        return 0
+    versions, means, logs, found = work.versions, work.means, work.logs, -1
+    least, weight = math.inf, weights[versions[k]]
+    for i in range(k):
+        gap = 0.0
+        for a in range(means.shape[1]):
+            offset, ratio = means[k, a] - means[i, a], logs[k, a] - logs[i, a]
+            gap += offset * offset * work.inverses[i, a] + 0.5 * ratio * ratio
+        # For weights v <= w only w / (v + w) differs between heavier versions.
+        share = weights[versions[i]] / (weights[versions[i]] + weight) if weight > 0.0 else 1.0
+        if share * share * gap < least:
+            least, found = share * share * gap, i
     return found
 
 
-@kernel
-def _find_pairs(versions: Ints, weights: Floats, moments: Moments, distance: float, pairs: _Pairs) -> None:
-    """Find the pairs of one label. versions: heaviest first.
+@borrowing
+def _find_pairs(count: int, weights: Floats, moments: Moments, distance: float, work: _Work, pairs: _Pairs) -> None:
+    """Find the pairs of one label, among the first `count` of `work.versions`.
 
     Merging two versions of weights v and w into their mixture changes the density by at most 2 v w / (v + w) times the
     L1 distance between them: by that much if the version determines the other labels, and not at all if it is
     independent of them.
     """
-    dim, places = moments.means.shape[1], _likeliest_heavier(versions, weights, moments)
-    factor, offset = np.empty((dim, dim)), np.empty(dim)
-    for k in range(1, len(versions)):
-        if places[k] < 0:
+    dim, factor, offset = moments.means.shape[1], work.factor, work.offset
+    if count > 2:
+        _write_diagonals(count, moments, work)
+    for k in range(1, count):
+        place = _likeliest_heavier(k, weights, work)
+        if place < 0:
             continue
-        other, heavier, squared = versions[k], versions[places[k]], 0.0
+        other, heavier, squared = work.versions[k], work.versions[place], 0.0
         if not cholesky(moments.covs[heavier], factor):
             continue
         for a in range(dim):
@@ -88,33 +135,29 @@ def _find_pairs(versions: Ints, weights: Floats, moments: Moments, distance: flo
 
 
 @kernel
-def _leaders(glmb: Glmb, choices: Choices, weights: Floats, distance: float, max_error: float) -> tuple[Ints, int]:
+def _leaders(glmb: Glmb, labels: Ints, weights: Floats, distance: float, max_error: float) -> tuple[Ints, int]:
     """Version that represents each track, shape (num_tracks,), and the number of such versions.
 
-    Cheapest pairs are merged first, while their costs sum to at most `max_error`.
+    labels: (num_labels, 2) of the tracks, each once. Cheapest pairs are merged first, while their costs sum to at most
+    `max_error`.
     """
-    moments, versions, labels = (
-        moments_of(glmb.tracks, 0, len(weights)),
-        np.empty(len(weights), np.int64),
-        glmb.tracks.labels,
-    )
-    pairs = _Pairs(np.full(len(weights), math.inf), filled_ints(len(weights), -1))
-    for k in range(len(choices.labels)):
-        count = 0
-        for track in range(len(weights)):
-            if labels[track, 0] == choices.labels[k, 0] and labels[track, 1] == choices.labels[k, 1]:
-                versions[count] = track
-                count += 1
-        order = descending_order(weights[versions[:count]])
-        _find_pairs(versions[:count][order], weights, moments, distance, pairs)
-    leader, num_leaders, spent = counted_ints(len(weights)), len(weights), 0.0
+    num, leader = len(weights), counted_ints(len(weights))
+    if len(labels) == num:  # every label has one version
+        return leader, num
+    moments = moments_of(glmb.tracks, 0, num)
+    work = _make_work(num, moments.means.shape[1])
+    pairs = _Pairs(np.full(num, math.inf), filled_ints(num, -1))
+    for k in range(len(labels)):
+        count = _versions_of(glmb.tracks.labels, labels[k, 0], labels[k, 1], weights, work.versions)
+        _find_pairs(count, weights, moments, distance, work, pairs)
+    num_leaders, spent = num, 0.0
     for track in descending_order(-pairs.costs):
         spent += pairs.costs[track]
         if spent > max_error:
             break
         leader[track] = pairs.heavier[track]
         num_leaders -= 1
-    for track in range(len(leader)):
+    for track in range(num):
         while leader[leader[track]] != leader[track]:
             leader[track] = leader[leader[track]]
     return leader, num_leaders
@@ -161,30 +204,43 @@ def merge_versions(glmb: Glmb, choices: Choices, caps: MixtureCaps, max_error: f
     for h in range(len(choices.weights)):
         for e in range(glmb.hyp_offsets[h], glmb.hyp_offsets[h + 1]):
             weights[glmb.hyp_tracks[e]] += choices.weights[h]
-    leader, num_leaders = _leaders(glmb, choices, weights, caps.merge_distance, max_error)
+    leader, num_leaders = _leaders(glmb, choices.labels, weights, caps.merge_distance, max_error)
     if num_leaders == len(leader):
         return glmb, choices, 0.0
     number, tracks = _merged_tracks(glmb.tracks, leader, num_leaders, weights, caps)
+    merged, found = _merged_hypotheses(glmb, choices, tracks, number[leader])
+    return merged, found, _pooling_error(glmb, tracks, leader, number, weights)
+
+
+@kernel
+def _merged_hypotheses(glmb: Glmb, choices: Choices, tracks: Tracks, track_of: Ints) -> tuple[Glmb, Choices]:
+    """Return the hypotheses over merged tracks, equal ones merged, heaviest first, and their choices.
+
+    track_of: (num_tracks,) merged track of each track.
+    """
     num_labels, filled = len(choices.labels), 0
     symbols, groups = np.empty(choices.symbols.shape, np.int64), np.empty(len(choices.weights), np.int64)
     for h in range(len(groups)):
         for k in range(num_labels):
             track = choices.symbols[h, k]
-            symbols[h, k] = number[leader[track]] if track >= 0 else -1
+            symbols[h, k] = track_of[track] if track >= 0 else -1
     firsts = group_choices(symbols, filled_ints(num_labels, 0), 0, groups)
     log_weights = group_log_sums(glmb.hyp_log_weights, groups, len(firsts))
     order, log_total = descending_order(log_weights), log_sum(log_weights)
-    offsets, members = np.zeros(len(order) + 1, np.int64), np.empty(len(order) * num_labels, np.int64)
-    sorted_weights = np.empty(len(order))
-    for i in range(len(order)):
+    num = len(order)
+    offsets, members = np.zeros(num + 1, np.int64), np.empty(num * num_labels, np.int64)
+    sorted_symbols, sorted_logs, weights = np.empty((num, num_labels), np.int64), np.empty(num), np.empty(num)
+    for i in range(num):
         for k in range(num_labels):
-            if symbols[firsts[order[i]], k] >= 0:
-                members[filled] = symbols[firsts[order[i]], k]
+            track = symbols[firsts[order[i]], k]
+            sorted_symbols[i, k] = track
+            if track >= 0:
+                members[filled] = track
                 filled += 1
-        offsets[i + 1], sorted_weights[i] = filled, log_weights[order[i]] - log_total
-    error = _pooling_error(glmb, tracks, leader, number, weights)
-    merged = Glmb(tracks, offsets, members[:filled].copy(), sorted_weights)
-    return merged, choices_of(merged), error
+        offsets[i + 1], sorted_logs[i] = filled, log_weights[order[i]] - log_total
+        weights[i] = math.exp(sorted_logs[i])
+    merged = Glmb(tracks, offsets, members[:filled].copy(), sorted_logs)
+    return merged, Choices(choices.labels, sorted_symbols, weights)
 
 
 @kernel

@@ -107,15 +107,20 @@ def update_tracks(naming: Naming, num_tracks: int, rows: Rows, options: Options,
 
 @kernel
 def assemble(
-    children: Children, kept: Ints, parents: Parents, rows: Rows, options: Options
+    children: Children, kept: Ints, parents: Parents, members: Ints, rows: Rows, options: Options
 ) -> tuple[Glmb, float, Naming]:
-    """Return the normalised posterior of the kept children, the log of their unnormalised sum, and its naming."""
+    """Return the normalised posterior of the kept children, the log of their unnormalised sum, and its naming.
+
+    members: (num_rows,) place in `rows` of each row of the options and parents.
+    """
     naming = make_naming(options.offsets[-1])
     hyps = Parents(np.empty(len(kept) + 1, np.int64), np.empty(children.filled[1], np.int64), np.empty(len(kept)))
     num, filled, log_total = name_tracks(children, kept, parents, options, naming, hyps)
     most = 0
     for i in range(num):
-        most += rows.offsets[naming.rows[i] + 1] - rows.offsets[naming.rows[i]]
+        row = members[naming.rows[i]]
+        naming.rows[i] = row
+        most += rows.offsets[row + 1] - rows.offsets[row]
     room = make_components(most, rows.components.means.shape[1])
     tracks = Tracks(np.empty((num, 2), np.int64), np.empty(num + 1, np.int64), room)
     last = update_tracks(naming, num, rows, options, tracks)

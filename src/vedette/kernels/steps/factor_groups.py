@@ -9,7 +9,7 @@ import numpy as np
 
 from vedette.kernels.association.assignment import Options
 from vedette.kernels.association.children import Parents
-from vedette.kernels.association.predicted import Rows, taken_rows
+from vedette.kernels.association.predicted import Rows
 from vedette.kernels.association.products import product_of
 from vedette.kernels.association.totals import log_row_totals, log_total_bound
 from vedette.kernels.base.compile import borrowing, inlined, kernel
@@ -27,12 +27,14 @@ class Factors(NamedTuple):
 
 
 class Group(NamedTuple):
-    """Factors that are updated jointly. Rows are in label order, and columns are numbered within the group."""
+    """Factors that are updated jointly. Rows are in label order, and rows and columns are numbered within the group."""
 
-    rows: Rows
+    members: Ints  # (num_rows,) of the scan
+    labels: Ints  # (num_rows, 2)
     options: Options
     parents: Parents  # products of the factors' hypotheses, heaviest first
     measurements: Ints  # (num_columns,) of the scan
+    log_totals: Floats  # (num_rows,) log total weight of each row's options
     log_bound: float  # log total weight of all joint choices if rows could share measurements, cut parents included
 
 
@@ -198,15 +200,19 @@ def _parents_of(factors: Factors, factor: int, place: Ints) -> Parents:
 
 @kernel
 def gather_group(
-    factors: Factors, members_of: Ints, rows: Rows, options: Options, max_hypotheses: int, place: Ints, columns: Ints
+    factors: Factors, members_of: Ints, labels: Ints, options: Options, max_hypotheses: int, place: Ints, columns: Ints
 ) -> Group:
     """Return the factors `members_of` as a separate problem.
 
-    place: (num_rows,) working array. columns: (num_measurements,) all -1, before and after.
+    labels: (num_rows, 2) of the rows. place: (num_rows,) working array. columns: (num_measurements,) all -1, before and
+    after.
     """
-    members = _members(factors, members_of, rows.labels)
+    members = _members(factors, members_of, labels)
+    own_labels = np.empty((len(members), 2), np.int64)
     for i in range(len(members)):
-        place[members[i]] = i
+        row = members[i]
+        place[row] = i
+        own_labels[i, 0], own_labels[i, 1] = labels[row, 0], labels[row, 1]
     own, measurements = _taken_options(options, members, columns)
     log_totals = log_row_totals(own)
     parents = _parents_of(factors, members_of[0], place)
@@ -215,4 +221,4 @@ def gather_group(
         other = _parents_of(factors, members_of[k], place)
         log_bound += log_total_bound(log_totals, other)
         parents = product_of(parents, other, max_hypotheses)
-    return Group(taken_rows(rows, members), own, parents, measurements, log_bound)
+    return Group(members, own_labels, own, parents, measurements, log_totals, log_bound)

@@ -12,7 +12,7 @@ from vedette.kernels.association.children import Children, make_children
 from vedette.kernels.association.predicted import Rows
 from vedette.kernels.association.ranked import Ranking, ranked
 from vedette.kernels.association.search import make_search
-from vedette.kernels.association.totals import ROUNDING, log_heaviest_left, log_row_totals, log_weight_bound
+from vedette.kernels.association.totals import ROUNDING, log_heaviest_left, log_weight_bound
 from vedette.kernels.association.truncation import Truncation
 from vedette.kernels.base.arrays import filled_ints
 from vedette.kernels.base.compile import borrowing, kernel
@@ -27,7 +27,7 @@ from vedette.kernels.labelled.splitting import Choices, choices_of, independent_
 from vedette.kernels.labelled.track_merging import merge_versions
 from vedette.kernels.steps.assembly import assemble
 from vedette.kernels.steps.factor_groups import Group
-from vedette.kernels.steps.glmb import Associated, kept_children
+from vedette.kernels.steps.glmb import kept_children
 from vedette.kernels.steps.lmb import Reduction, append_reduced, write_mixture
 
 # Indices of the sums of a scan; see `FactoredReport`.
@@ -176,18 +176,22 @@ def make_ranking() -> Ranking:
 
 
 @kernel
-def update_group(group: Group, truncation: Truncation, ranking: Ranking, work: Work) -> tuple[Glmb, Ranking]:
-    """Return the posterior of a group, empty with a log total of -inf if no joint choice was found, and its ranking."""
-    found, sums = Associated(group.rows, group.options, group.parents, 0.0, 0), work.sums
-    ranking, cut = ranked(group.options, group.parents, truncation.search, ranking)
+def update_group(
+    group: Group, rows: Rows, truncation: Truncation, ranking: Ranking, work: Work
+) -> tuple[Glmb, Ranking]:
+    """Return the posterior of a group, empty with a log total of -inf if no joint choice was found, and its ranking.
+
+    rows: of the scan.
+    """
+    options, parents, sums = group.options, group.parents, work.sums
+    ranking, cut = ranked(options, parents, truncation.search, ranking)
     children = ranking.children
     log_next = log_heaviest_left(children, truncation.search, cut)
-    log_totals = log_row_totals(group.options)
-    log_bound = log_weight_bound(group.options, group.parents, children, log_totals, log_next, group.log_bound)
+    log_bound = log_weight_bound(options, parents, children, group.log_totals, log_next, group.log_bound)
     # An exhausted search has left nothing out.
     is_covered = children.filled[0] < truncation.search.max_hypotheses and not cut
-    children, kept = kept_children(found, children, truncation, is_covered)
-    posterior, log_total, _ = assemble(children, kept, group.parents, group.rows, group.options)
+    children, kept = kept_children(group.labels, options, parents, children, truncation, is_covered)
+    posterior, log_total, _ = assemble(children, kept, parents, group.members, rows, options)
     sums[TOTAL] += log_total
     sums[CUT] += 1.0 if cut else 0.0
     if len(kept) == 0:

@@ -12,7 +12,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from vedette.kernels.association.alternatives import alternatives_of, log_unclaimed
+from vedette.kernels.association.alternatives import Alternatives, alternatives_of, log_unclaimed
+from vedette.kernels.association.assignment import Options
 from vedette.kernels.association.contention import apply_contention
 from vedette.kernels.association.first_detections import (
     candidates_of,
@@ -22,7 +23,7 @@ from vedette.kernels.association.first_detections import (
 from vedette.kernels.association.joined_rows import joined_rows
 from vedette.kernels.association.links import linked_factors
 from vedette.kernels.association.options import weighed_options_at
-from vedette.kernels.association.predicted import rows_of_scan
+from vedette.kernels.association.predicted import Rows, rows_of_scan
 from vedette.kernels.association.truncation import Truncation
 from vedette.kernels.base.arrays import group_members
 from vedette.kernels.base.compile import kernel
@@ -48,6 +49,7 @@ from vedette.kernels.steps.factor_updates import (
     TOTAL,
     TWICE,
     Factoring,
+    Work,
     append_parts,
     found_faint,
     make_ranking,
@@ -83,6 +85,88 @@ class FactoredReport(NamedTuple):
     most_labels: int  # of a group
 
 
+class _Associated(NamedTuple):
+    """The rows of a scan, candidates last, and the options of each."""
+
+    rows: Rows
+    options: Options
+    alone: Alternatives  # options of each label, as if labels were independent
+    seen: Rows  # the undetected targets
+    log_clutter: float  # as in `FactoredReport`
+    num_raised: int
+    left_out: float
+    log_left_out: float  # as in `Candidates`
+
+
+@kernel
+def _associate(
+    prior: FactoredGlmb,
+    undetected: Undetected,
+    scan: ScanInput,
+    motion: Motion | None,
+    sensor: Sensor,
+    truncation: Truncation,
+    least_logit: float,
+) -> _Associated:
+    """Weigh the options of all tracks and of the labels that the scan may begin. least_logit: of such a label."""
+    rows = rows_of_scan(prior.tracks, scan, motion, sensor)
+    weigh_singles(prior, rows)
+    log_levels = np.empty(len(scan.measurements))
+    options, log_clutter, num_raised = weighed_options_at(rows, scan, sensor, truncation, log_levels)
+    local = intensity_at_places(undetected)
+    seen = seen_intensity(stacked_mixtures(undetected.intensity, local), scan, sensor)
+    presence = presence_of_rows(prior, len(rows.log_absent) + len(scan.measurements))
+    alone = alternatives_of(options, rows.labels, presence[: len(rows.log_absent)])
+    unclaimed = log_unclaimed(options, alone) if len(seen.log_absent) > 0 else np.zeros(len(scan.measurements))
+    label = undetected.step, undetected.first_index
+    new = candidates_of(
+        seen, len(local.log_weights), scan, sensor, log_levels, unclaimed, truncation.gate, least_logit, label
+    )
+    if len(new.rows.log_absent) > 0:
+        rows, options = joined_rows(rows, options, new.rows, new.options)
+        alone = alternatives_of(options, rows.labels, presence[: len(rows.log_absent)])
+    return _Associated(rows, options, alone, seen, log_clutter, num_raised, new.left_out, new.log_left_out)
+
+
+@kernel
+def _update_groups(
+    prior: FactoredGlmb,
+    found: _Associated,
+    truncation: Truncation,
+    reduction: Reduction,
+    factoring: Factoring,
+) -> tuple[FactoredGlmb, Work, float, int]:
+    """Return the updated factors, with the sums of the scan in the working arrays.
+
+    Also return the log of the factor by which shared measurements lower the total weight, and the labels of the largest
+    group.
+    """
+    rows, options, alone = found.rows, found.options, found.alone
+    factors = factors_of(prior, len(rows.log_absent) - len(prior.tracks.labels))
+    sizes, most = factors.num_labels.copy(), truncation.search.max_hypotheses
+    leaders = linked_factors(options, alone, factors.row_offsets, sizes, factoring.max_cut, factoring.max_together)
+    log_twice = apply_contention(options, groups_of_rows(factors, leaders), alone, rows.offsets)
+    offsets, members = group_members(leaders, len(leaders))
+    work, ranking, most_labels = make_work(rows, options), make_ranking(), 0
+    widest = len(work.wide.log_weights)
+    store = make_store(len(rows.log_absent), 2 * len(rows.components.log_weights), rows.components.means.shape[1])
+    for leader in range(len(leaders)):
+        together = members[offsets[leader] : offsets[leader + 1]]
+        if len(together) == 0 or factors.num_labels[leader] == 0:
+            continue
+        most_labels = max(most_labels, sizes[leader])
+        if len(together) == 1 and is_single(factors, leader):
+            if not has_room_for_single(store, widest):
+                store = with_room(store, 1, 1, widest, 2, 1)
+            update_alone(factors.row_offsets[leader], rows, options, reduction, store, work)
+            continue
+        group = gather_group(factors, together, rows.labels, options, most, work.place, work.columns)
+        posterior, ranking = update_group(group, rows, truncation, ranking, work)
+        if len(posterior.hyp_log_weights) > 0:
+            store = append_parts(store, posterior, factoring, reduction, most, work)
+    return stored(store), work, log_twice, most_labels
+
+
 @kernel
 def step_factored(
     prior: FactoredGlmb,
@@ -103,64 +187,28 @@ def step_factored(
     """
     if motion is not None:
         undetected = predicted_undetected(undetected, motion, scan.dt, arrivals)
-    rows = rows_of_scan(prior.tracks, scan, motion, sensor)
-    weigh_singles(prior, rows)
-    log_levels = np.empty(len(scan.measurements))
-    options, log_clutter, num_raised = weighed_options_at(rows, scan, sensor, truncation, log_levels)
-    local = intensity_at_places(undetected)
-    seen = seen_intensity(stacked_mixtures(undetected.intensity, local), scan, sensor)
-    presence = presence_of_rows(prior, len(rows.log_absent) + len(scan.measurements))
-    alone = alternatives_of(options, rows.labels, presence[: len(rows.log_absent)])
-    unclaimed = log_unclaimed(options, alone) if len(seen.log_absent) > 0 else np.zeros(len(scan.measurements))
-    gate, least, label = truncation.gate, reduction.min_existence_logit, (undetected.step, undetected.first_index)
-    new = candidates_of(seen, len(local.log_weights), scan, sensor, log_levels, unclaimed, gate, least, label)
-    if len(new.rows.log_absent) > 0:
-        rows, options = joined_rows(rows, options, new.rows, new.options)
-        alone = alternatives_of(options, rows.labels, presence[: len(rows.log_absent)])
-    factors = factors_of(prior, len(rows.log_absent) - len(prior.tracks.labels))
-    sizes = factors.num_labels.copy()
-    leaders = linked_factors(options, alone, factors.row_offsets, sizes, factoring.max_cut, factoring.max_together)
-    log_twice = apply_contention(options, groups_of_rows(factors, leaders), alone, rows.offsets)
-    offsets, members = group_members(leaders, len(leaders))
-    work, ranking, most_labels = make_work(rows, options), make_ranking(), 0
-    widest = len(work.wide.log_weights)
-    store = make_store(len(rows.log_absent), 2 * len(rows.components.log_weights), rows.components.means.shape[1])
-    for leader in range(len(leaders)):
-        together = members[offsets[leader] : offsets[leader + 1]]
-        if len(together) == 0 or factors.num_labels[leader] == 0:
-            continue
-        most_labels = max(most_labels, sizes[leader])
-        if len(together) == 1 and is_single(factors, leader):
-            if not has_room_for_single(store, widest):
-                store = with_room(store, 1, 1, widest, 2, 1)
-            update_alone(factors.row_offsets[leader], rows, options, reduction, store, work)
-            continue
-        most = truncation.search.max_hypotheses
-        group = gather_group(factors, together, rows, options, most, work.place, work.columns)
-        posterior, ranking = update_group(group, truncation, ranking, work)
-        if len(posterior.hyp_log_weights) > 0:
-            store = append_parts(store, posterior, factoring, reduction, most, work)
-    sums, density = work.sums, stored(store)
+    found = _associate(prior, undetected, scan, motion, sensor, truncation, reduction.min_existence_logit)
+    density, work, log_twice, most_labels = _update_groups(prior, found, truncation, reduction, factoring)
     require_gaussians(density.tracks.components.means, density.tracks.components.covs)
-    missed, log_missed = missed_intensity(seen, scan, sensor, len(undetected.intensity.log_weights))
-    left = left_in_cells(undetected, sensor, scan.pose)
+    missed, log_missed = missed_intensity(found.seen, scan, sensor, len(undetected.intensity.log_weights))
+    left, sums = left_in_cells(undetected, sensor, scan.pose), work.sums
     log_missed += left.changes[0] if len(left.changes) > 0 else 0.0
     return (
         density,
         stacked_mixtures(missed, found_faint(work)),
         left,
         FactoredReport(
-            sums[TOTAL] + log_twice + log_missed + new.log_left_out,
+            sums[TOTAL] + log_twice + log_missed + found.log_left_out,
             sums[KEPT],
-            log_clutter,
-            num_raised,
+            found.log_clutter,
+            found.num_raised,
             sums[CUT] > 0.0,
             sums[FULL] > 0.0,
             min(sums[TWICE], 1.0),
             sums[SPLIT],
             sums[REDUCED],
             sums[DROPPED],
-            new.left_out,
+            found.left_out,
             most_labels,
         ),
     )

@@ -38,7 +38,7 @@ from vedette.kernels.association.totals import (
     log_weight_bound,
 )
 from vedette.kernels.association.truncation import Truncation, heaviest_first, keep_heaviest, merge_equal
-from vedette.kernels.base.arrays import filled_ints
+from vedette.kernels.base.arrays import counted_ints, filled_ints
 from vedette.kernels.base.compile import kernel
 from vedette.kernels.base.types import Glmb, Ints, Motion, ScanInput, Sensor
 from vedette.kernels.gaussian.mixtures import require_gaussians
@@ -98,17 +98,17 @@ def _associate(
 
 @kernel
 def kept_children(
-    found: Associated, children: Children, truncation: Truncation, is_covered: bool
+    labels: Ints, options: Options, parents: Parents, children: Children, truncation: Truncation, is_covered: bool
 ) -> tuple[Children, Ints]:
     """Return the children, each hypothesis once, with the best of every association; and those to keep, heaviest first.
 
-    is_covered: True if nothing that `max_track_gap` would keep has been left out.
+    labels: (num_rows, 2) of the rows. is_covered: True if nothing that `max_track_gap` would keep has been left out.
     """
-    rows, options, parents, caps = found.rows, found.options, found.parents, truncation.search
+    caps = truncation.search
     covering = truncation.max_track_gap > 0.0 and not is_covered
     associations = Associations(np.empty(0, np.int64), 0)
     if covering:
-        associations = associations_of_options(rows.labels, options)
+        associations = associations_of_options(labels, options)
         children = add_uncovered(options, associations, parents, children, truncation.max_track_gap)
     # Two parents that differ only in tracks that are now absent have the same child: it is one hypothesis.
     order = heaviest_first(children, merge_equal(children, options.columns))
@@ -151,8 +151,10 @@ def _conclude(
     log_totals = log_row_totals(found.options)
     log_bound = log_total_bound(log_totals, found.parents)
     log_bound = log_weight_bound(found.options, found.parents, children, log_totals, log_next, log_bound)
-    children, kept = kept_children(found, children, truncation, is_covered)
-    posterior, log_total, naming = assemble(children, kept, found.parents, found.rows, found.options)
+    labels = found.rows.labels
+    children, kept = kept_children(labels, found.options, found.parents, children, truncation, is_covered)
+    members = counted_ints(len(labels))
+    posterior, log_total, naming = assemble(children, kept, found.parents, members, found.rows, found.options)
     require_gaussians(posterior.tracks.components.means, posterior.tracks.components.covs)
     log_kept = log_total - log_bound if log_bound - log_total > ROUNDING else 0.0
     full = len(kept) >= truncation.search.max_hypotheses
