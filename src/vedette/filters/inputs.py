@@ -46,7 +46,6 @@ def check_scan(scan: Any, sensor: SensorModel) -> tuple[Floats, Ints]:
     """
     measurement, meas_dim = sensor.measurement, sensor.meas_dim
     expected = f"an array of shape (num_measurements, {meas_dim}), empty for a scan without measurements"
-    wider = row_length(meas_dim)
     if scan is None:
         raise InputError(f"scan: expected {expected}; got None")
     given = scan
@@ -54,13 +53,14 @@ def check_scan(scan: Any, sensor: SensorModel) -> tuple[Floats, Ints]:
         given = as_array("scan", scan, "fiu", f"numbers in {expected}")
     if given.size == 0 and given.ndim <= 2:
         return np.empty((0, meas_dim)), _NO_ROWS
-    if given.ndim != 2 or given.shape[1] not in (meas_dim, wider):
+    brings_noise = given.ndim == 2 and given.shape[1] != meas_dim
+    if given.ndim != 2 or (brings_noise and given.shape[1] != row_length(meas_dim)):
         raise InputError(f"scan: expected {expected}; got shape {given.shape}")
     array = np.array(given, dtype=np.float64, order="C")
     bad, is_below, largest, may_repeat = examined_scan(array, measurement.least, measurement.angular)
     if bad >= 0:
         raise InputError(f"scan: expected finite numbers; got {array[bad].tolist()} in row {bad}")
-    if given.shape[1] == wider:
+    if brings_noise:
         check_row_noise("scan", array, meas_dim)
     if is_below:
         _warn_negative(array, measurement, sensor.noise.least_stds)
@@ -121,7 +121,7 @@ def births_for(
     else:
         return no_births_for_kernel(birth.state_dim)
     if belief is not None and len(born.tracks.labels):
-        check_new(belief, born.tracks.labels[:, 0].min(), step)
+        check_new(belief, int(born.tracks.labels[0, 0]), step)  # labels of an LMB increase
     return born.to_kernel()
 
 

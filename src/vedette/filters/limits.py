@@ -135,14 +135,13 @@ class Limits:
         That is the summed existence of the dropped labels, and True if the number of labels reached `max_labels`. Of
         more than `max_labels` labels, the least probable ones are dropped.
         """
-        excess, is_full = np.empty((0, 2), np.int64), False
-        if belief.tracks.num_tracks >= self.max_labels:  # labels may have several
-            labels, existence = existence_probabilities(belief)
-            excess = labels[np.argsort(-existence, kind="stable")[self.max_labels :]]
-            is_full = len(labels) >= self.max_labels
+        if belief.tracks.num_tracks < self.max_labels:  # labels may have several
+            return *self.without_spread(belief), False
+        labels, existence = existence_probabilities(belief)
+        excess = labels[np.argsort(-existence, kind="stable")[self.max_labels :]]
         fewer, dropped = without_labels(belief, excess)
         kept, spread = self.without_spread(fewer)
-        return kept, dropped + spread, is_full
+        return kept, dropped + spread, len(labels) >= self.max_labels
 
     def kept(self, belief: _Labelled) -> _Labelled:
         """Return the belief without the labels that `min_existence`, `max_labels` and `max_position_std` drop."""

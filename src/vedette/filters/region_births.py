@@ -91,11 +91,12 @@ def with_cells(before: UndetectedTargets, birth: BirthModel, dt: float, *, appea
 
 def _on_grid(before: UndetectedTargets, cells: UndetectedIntensity, places: RegionBirths | None) -> UndetectedTargets:
     """Return the same targets on the grid object of the model."""
+    if places is not None and cells.grid is places.model.grid:
+        return before
     if places is None or cells.grid != places.model.grid:
         expected = "none" if places is None else f"those of the filter's births, {places.model.grid}"
         raise reject("belief.undetected.cells", expected, cells.grid)
-    own = places.model.grid
-    return before if cells.grid is own else replace(before, cells=UndetectedIntensity(own, cells.expected))
+    return replace(before, cells=UndetectedIntensity(places.model.grid, cells.expected))
 
 
 def _in_scans(birth: BirthModel) -> bool:
@@ -122,10 +123,15 @@ def arrivals_of(
     birth, places = targets.birth, region_births(targets.birth)
     if places is None or before.cells is None:
         return without_change(born, most)
-    model = places.model
-    rates = [_rate_of(before, birth, places, dt)] + [1.0] * (before.birth_rate is not None)
-    survival = -1.0 if model.survival is None else float(model.survival**dt)
-    return Arrivals(born, most, survival, *model.shares(dt), np.array(rates) * appear * dt)
+    period = dt if appear else 0.0
+    numbers = [_rate_of(before, birth, places, dt) * period] + [period] * (before.birth_rate is not None)
+    return Arrivals(born, most, *_changes(places.model, dt), np.array(numbers))
+
+
+@lru_cache(maxsize=1000)
+def _changes(model: UndetectedModel, dt: float) -> tuple[float, Floats, Floats]:
+    """Return the survival and the shares of `Arrivals` for `dt` seconds."""
+    return -1.0 if model.survival is None else float(model.survival**dt), *model.shares(dt)
 
 
 def without_change(born: Mixture, most: int) -> Arrivals:

@@ -94,7 +94,10 @@ def with_step(undetected: UndetectedTargets, step: Any, num_sites: int) -> Undet
     number, last = step_number(step), undetected.next_label[0]
     if number < last:
         raise reject("step", f"at least {last}, the step of the belief", step)
-    return undetected if number == last else replace(undetected, next_label=(number, num_sites))
+    if number == last:
+        return undetected
+    parts = undetected.intensity, (number, num_sites), undetected.cells, undetected.birth_rate
+    return unchecked(UndetectedTargets, *parts)
 
 
 def before_scan(
@@ -103,18 +106,16 @@ def before_scan(
     """Return the undetected targets and the places of the measurements in the form that `step_factored` needs."""
     (step, index), found, measured = undetected.next_label, region_births(birth), birth.from_measurements
     intensity, none = undetected.intensity.to_kernel(), no_undetected(birth.state_dim)
-    before = none._replace(intensity=intensity, step=step, first_index=index)
     if found is None or undetected.cells is None:
-        return before
-    learnt = undetected.birth_rate
+        return none._replace(intensity=intensity, step=step, first_index=index)
+    places, std, learnt = none.places, none.std, undetected.birth_rate
+    if measured is not None and len(scan):
+        std = measured.std
+        if is_turn(pose) and len(std) >= 4:  # a target moves until the beam passes it
+            std = np.concatenate([np.hypot(std[:2], longest_lag(pose) * std[2:4]), std[2:]])
+        places = sensor.measurement.states_at(scan, pose, len(std))
     rate = 0.0 if learnt is None else learnt.rate
-    before = before._replace(tables=tables_of(undetected), cells=found.cells, birth_rate=rate)
-    if measured is None or not len(scan):
-        return before
-    std = measured.std
-    if is_turn(pose) and len(std) >= 4:  # a target moves until the beam passes it
-        std = np.concatenate([np.hypot(std[:2], longest_lag(pose) * std[2:4]), std[2:]])
-    return before._replace(places=sensor.measurement.states_at(scan, pose, len(std)), std=std)
+    return Undetected(intensity, tables_of(undetected), found.cells, places, std, step, index, rate)
 
 
 def after_scan(before: UndetectedTargets, missed: Mixture, left: Left, num_measurements: int) -> UndetectedTargets:
