@@ -111,12 +111,13 @@ def births_from_scans(
     first = birth.num_sites if owner is None else OWN_LABELS * (owner + 1)
     parameters = BirthsOfMeasurements(model.std, float(model.expected), float(model.max_existence), step, first)
     scanned = [s for s, scan in enumerate(scans) if scan is not None]
+    checked = [pose_vector("pose", poses[s]) for s in scanned]
     if len(scanned) == 1:
-        births = _births_of_single_sensor(belief, sensors[scanned[0]], scans[scanned[0]], poses[scanned[0]], parameters)
+        births = _births_of_single_sensor(belief, sensors[scanned[0]], scans[scanned[0]], checked[0], parameters)
     else:
         births = _births_of_pool(unexplained_measurements(model, belief, sensors, scans, poses), parameters)
     births = with_velocities(births, model.std, sensors, scans, poses)
-    return at_scan_time(births, [pose_vector("pose", poses[s]) for s in scanned])
+    return at_scan_time(births, checked)
 
 
 def combine_births(birth: BirthModel, earlier: LMB | None, later: LMB | None) -> LMB | None:
@@ -140,7 +141,7 @@ def unexplained_measurements(
     """Return the measurements that no track explains with certainty, pooled over sensors; see `births_from_scans`."""
     lmb = _as_kernel(belief)
     by_sensor = [
-        _unexplained_by_sensor(lmb, sensor, scans[s], poses[s], s)
+        _unexplained_by_sensor(lmb, sensor, scans[s], pose_vector("pose", poses[s]), s)
         for s, sensor in enumerate(sensors)
         if scans[s] is not None
     ]
@@ -170,18 +171,16 @@ def _as_kernel(belief: LabelledDensity) -> Lmb:
     return as_lmb(belief).to_kernel()
 
 
-def _scan_input(belief: Lmb, sensor: SensorModel, scan: Any, pose: Any) -> ScanInput:
+def _scan_input(belief: Lmb, sensor: SensorModel, scan: Any, pose: Floats) -> ScanInput:
     """Return a scan, already checked by the filters, as input of kernels."""
     measurements = np.ascontiguousarray(scan, np.float64)
     if not len(measurements):
         measurements = np.empty((0, sensor.meas_dim))
-    return ScanInput(
-        no_births_for_kernel(belief.tracks.components.means.shape[1]), measurements, pose_vector("pose", pose), 0.0
-    )
+    return ScanInput(no_births_for_kernel(belief.tracks.components.means.shape[1]), measurements, pose, 0.0)
 
 
 def _unexplained_by_sensor(
-    belief: Lmb, sensor: SensorModel, scan: Any, pose: Any, number: int
+    belief: Lmb, sensor: SensorModel, scan: Any, pose: Floats, number: int
 ) -> UnexplainedMeasurements:
     scan_input = _scan_input(belief, sensor, scan, pose)
     with model_errors():
@@ -194,7 +193,7 @@ def _unexplained_by_sensor(
 
 
 def _births_of_single_sensor(
-    belief: LabelledDensity, sensor: SensorModel, scan: Any, pose: Any, parameters: BirthsOfMeasurements
+    belief: LabelledDensity, sensor: SensorModel, scan: Any, pose: Floats, parameters: BirthsOfMeasurements
 ) -> LMB:
     """Return the birth candidates from the scan of a single sensor."""
     lmb = _as_kernel(belief)
