@@ -69,7 +69,7 @@ class TrackerInfo(SummaryRepr):
         filters: reports of the filters: one per sensor, or a single one for all sensors together.
         fusion: report of the fusion; None without fusion.
         seconds: wall time by stage; the record of a run contains "filter" and "fusion".
-        bytes_sent: bytes that each sensor sent; empty if the tracker does not count them.
+        bytes_sent: bytes that each sensor sent; empty if the tracker sends nothing or does not count them.
     """
 
     filters: tuple[FilterInfo, ...]

@@ -77,7 +77,7 @@ class Distributed(LocalFilters):
         births: Sequence[LMB | None] = (None,) * num
         if birth.from_measurements is not None:
             births = [birth_candidates(birth, step, dt, candidates) for candidates in state.memory or births]
-        prediction, local, infos, scanned, sent = None, [], [], [], []
+        prediction, local, infos, scanned = None, [], [], []
         if self._requires_common_prior:
             with timer.timing("filter"):
                 prediction, _ = self._predict(0, state.fused, dt, step, births[0])
@@ -91,11 +91,12 @@ class Distributed(LocalFilters):
                     belief, info = self._update(s, prediction, scans[s], pose_array[s], rngs[s])
             local.append(belief)
             infos.append(info)
-            sent.append(belief_bytes(belief))
             # Without feedback, a sensor's belief still has the information of its earlier scans.
             scanned.append(scans[s] is not None or not self.feedback)
         fused, report, measured, rule = local[0], None, None, self.fusion
+        sent: tuple[int, ...] = ()
         if rule is not None:
+            sent = tuple(map(belief_bytes, local))
             views = FieldsOfView(self.sensors, pose_array, tuple(scanned), prediction)
             with timer.timing("fusion"):
                 if birth.from_measurements is not None and not self.feedback and self.min_detection > 0.0:
@@ -117,7 +118,7 @@ class Distributed(LocalFilters):
                     measured = tuple(
                         combine_births(birth, *candidates) for candidates in zip(state.memory, measured, strict=True)
                     )
-        tracker_info = TrackerInfo(tuple(infos), report, timer.seconds, tuple(sent))
+        tracker_info = TrackerInfo(tuple(infos), report, timer.seconds, sent)
         undetected = undetected_intensity(fused, self.targets.birth)
         return State(tuple(local), fused, step, float(time), measured, undetected), tracker_info
 
