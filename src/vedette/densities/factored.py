@@ -12,7 +12,7 @@ from vedette.densities import checks
 from vedette.densities.containers import kernel_arrays, unchecked
 from vedette.densities.glmb import GLMB, Hypotheses
 from vedette.densities.labelled import LMB, LabelledDensity
-from vedette.densities.tracks import TrackTable
+from vedette.densities.tracks import TrackTable, tracks_between
 from vedette.densities.undetected import UndetectedTargets
 from vedette.errors import InputError, VedetteError
 from vedette.internal.text import pluralise
@@ -106,18 +106,8 @@ class FactoredGLMB(Hypotheses):
         """Return one factor as a GLMB."""
         low, high = self.track_offsets[index], self.track_offsets[index + 1]
         first, last = self.factor_offsets[index], self.factor_offsets[index + 1]
-        table, begin, end = self.tracks, self.hyp_offsets[first], self.hyp_offsets[last]
-        start, stop = table.offsets[low], table.offsets[high]
-        tracks = unchecked(
-            TrackTable,
-            table.labels[low:high],
-            table.offsets[low : high + 1] - start,
-            table.log_weights[start:stop],
-            table.means[start:stop],
-            table.covs[start:stop],
-            None if table.sources is None else table.sources[low:high],
-        )
-        offsets = self.hyp_offsets[first : last + 1] - begin
+        begin, end = self.hyp_offsets[first], self.hyp_offsets[last]
+        tracks, offsets = tracks_between(self.tracks, low, high), self.hyp_offsets[first : last + 1] - begin
         return unchecked(GLMB, tracks, offsets, self.hyp_tracks[begin:end] - low, self.hyp_log_weights[first:last])
 
     @property

@@ -152,6 +152,14 @@ def take_tracks(tracks: TrackTable, places: Ints) -> TrackTable:
     return TrackTable.from_kernel(kt.Tracks(tracks.labels[places], offsets, taken), sources)
 
 
+def tracks_between(tracks: TrackTable, first: int, last: int) -> TrackTable:
+    """Return the tracks `first:last`."""
+    start, stop = tracks.offsets[first], tracks.offsets[last]
+    columns = (column[start:stop] for column in tracks.to_kernel().components)
+    sources = None if tracks.sources is None else tracks.sources[first:last]
+    return unchecked(TrackTable, tracks.labels[first:last], tracks.offsets[first : last + 1] - start, *columns, sources)
+
+
 def relabelled_tracks(tracks: TrackTable, labels: Ints) -> TrackTable:
     """Return the same mixtures with other labels."""
     return unchecked(TrackTable, labels, *_MIXTURES(tracks), None)
