@@ -125,6 +125,8 @@ def make_venv() -> None:
 def install(extent: str, *, dependencies: bool) -> None:
     """Install the project, and the dependencies locked for `extent` where they are asked for, into `.venv`."""
     pip = [str(PYTHON), "-m", "pip", "install", "--quiet", "--disable-pip-version-check", "--no-input", "--no-user"]
+    if not sys.dont_write_bytecode:
+        pip.append("--no-compile")  # Python compiles what it imports; compiling all modules takes longer than the rest
     if dependencies:
         source = ["--no-binary", "pyyaml"] if sys.version_info >= (3, 15) else []  # no wheel yet; needs no compiler
         call(
