@@ -60,11 +60,11 @@ class Row:
         return 1e3 * self.filter_ms / self.num_targets
 
 
-def prepared(crowd: GeneratedCrowd, kind: str) -> tuple[Experiment, Truth, list[np.ndarray]]:
+def prepared(crowd: GeneratedCrowd, kind: str, seed: int = 0) -> tuple[Experiment, Truth, list[np.ndarray]]:
     """The experiment, the true targets and the scans."""
     scenario = replace_fields(Scenario(parse_scenario(crowd_text(crowd))), {"filter.kind": kind})
     experiment = build_experiment(scenario)
-    rng = np.random.default_rng(0)
+    rng = np.random.default_rng(seed)
     truth = experiment.targets.truth(experiment.times, rng=rng)
     sensor, pose = experiment.tracker.sensors[0], experiment.poses[0]
     scans = [simulate_scan(truth.at(k)[1], pose, sensor, rng=rng).measurements for k in range(truth.num_scans)]

@@ -1,15 +1,16 @@
-"""Ours beside other libraries on the same scans: a crowd of growing size, and fifty objects seen by eight sensors.
+"""Vedette and other libraries on the same scans: crowds of growing size, and objects that eight sensors observe.
 
-    python benchmarks/peers.py [--peers-python PYTHON] [--crowd N ...] [--objects N] [--figure FILE]
+    python benchmarks/peers.py [--peers-python PYTHON] [--crowd N ...] [--objects N ...] [--seeds N] [--figure FILE]
 
-Peers are `stonesoup` (its GM-PHD filter) and `multisensor-lmb-filters-rs` (LMB filters in Rust). Neither is needed by
-anything else: where one is not installed a line says so, and its rows are left out. They may be installed for another
-Python, whose path `--peers-python` or the variable `PEERS_PYTHON` gives; see `benchmarks/peer_filters.py`.
+Peers are `stonesoup` (its GM-PHD filter) and `multisensor-lmb-filters-rs` (LMB filters in Rust). They are optional: a
+message says which one is not installed, and its rows are left out. They may be installed for another Python, given by
+`--peers-python` or the variable `PEERS_PYTHON`; see `benchmarks/peer_filters.py`.
 
-Crowds are those of `benchmarks/crowd.py`. Births are made of what was measured one scan before, for all alike: ours
-are part of our time, for the peers they are made outside of theirs. The eight sensors are those of
-`benchmarks/eight_sensors.py`. CPU time of a step, median; OSPA with c = 25 m (crowd) or 5 m and p = 1, mean from the
-sixth scan on.
+Crowds are those of `benchmarks/crowd.py`. All filters receive births at the measurements of the previous scan. The time
+of Vedette includes making them, that of the peers does not. The eight sensors are those of
+`benchmarks/eight_sensors.py`. Time is the median CPU time of a step in a run, then the median over runs (bars: least
+and largest run). OSPA, with c = 25 m (crowd) or 5 m and p = 1, is the mean from the sixth scan on, then over runs
+(bars and ±: two standard errors). Runs of one seed have the same targets and scans for all filters.
 """
 
 from __future__ import annotations
@@ -22,6 +23,7 @@ import sys
 import tempfile
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from itertools import product
 from pathlib import Path
 
 import numpy as np
@@ -32,26 +34,46 @@ from vedette.evaluation import ospa
 from vedette.evaluation.figures.style import COLOURS, line_style
 from vedette.scenarios import GeneratedCrowd
 
-# Steps that take longer end a peer's run; and sizes beyond are not tried.
+# Longest step of a peer in s: a longer one ends its run, and larger scenes are not tried.
 PATIENCE = 10.0
+DEFAULT = f"Vedette, {NAMES['factored_glmb']} (default)"
+FIRST_BOX = 42  # seed of the first scene with eight sensors
 
 
 @dataclass(frozen=True)
 class Row:
-    """What one filter took and reached."""
+    """Time and OSPA of one filter in one scene, by seed."""
 
     scene: str
     filter: str
     num_targets: int
-    milliseconds: float
-    ospa: float
+    milliseconds: tuple[float, ...]  # median of a run's scans
+    ospa: tuple[float, ...]  # mean of a run's scans
+
+    @property
+    def ospa_error(self) -> float:
+        """Two standard errors of the mean OSPA; 0 for one run."""
+        num = len(self.ospa)
+        return 2.0 * float(np.std(self.ospa, ddof=1)) / num**0.5 if num > 1 else 0.0
 
 
-# Ours
+def pooled(rows: Sequence[Row]) -> list[Row]:
+    """Return one row for each scene, filter and number of targets, with the runs of all its rows."""
+    by_key: dict[tuple[str, str, int], list[Row]] = {}
+    for row in rows:
+        by_key.setdefault((row.scene, row.filter, row.num_targets), []).append(row)
+    return [
+        Row(*key, sum((row.milliseconds for row in group), ()), sum((row.ospa for row in group), ()))
+        for key, group in by_key.items()
+    ]
 
 
-def our_box(num_objects: int, num_steps: int) -> Iterator[Row]:
-    truth, scans = box_scene(num_objects, num_steps)
+# Vedette
+
+
+def own_box(num_objects: int, num_steps: int, seed: int) -> Iterator[Row]:
+    """Return the rows of Vedette's fusions of eight sensors."""
+    truth, scans = box_scene(num_objects, num_steps, FIRST_BOX + seed)
     for rule in RULES:
         box_run(rule, scans[:3])
         seconds, estimates = box_run(rule, scans)
@@ -59,15 +81,17 @@ def our_box(num_objects: int, num_steps: int) -> Iterator[Row]:
         yield scored("8 sensors", f"Vedette, {rule}", truth, seconds, found, cutoff=5.0)
 
 
-def our_crowd(num_targets: int, num_steps: int) -> Iterator[Row]:
+def own_crowd(num_targets: int, num_steps: int, seed: int) -> Iterator[Row]:
+    """Return the rows of Vedette's filters of crowds."""
     for kind in ("lmb", *(kind for kind in NAMES if kind not in ("lmb", "delta_glmb"))):
         crowd = GeneratedCrowd(num_targets=num_targets, num_steps=num_steps)
-        experiment, truth, scans = prepared(crowd, kind)
+        experiment, truth, scans = prepared(crowd, kind, seed)
         tracked(experiment, scans[:8])
         _, seconds, estimates = tracked(experiment, scans)
         true = [truth.at(k)[1][:, :2] for k in range(num_steps)]
         found = [np.empty((0, 2))] * (FROM_STEP - 1) + [estimate.means[:, :2] for estimate in estimates]
-        yield scored("crowd", f"Vedette, {NAMES[kind]}", true, seconds, found, cutoff=CUTOFF)
+        name = DEFAULT if kind == "factored_glmb" else f"Vedette, {NAMES[kind]}"
+        yield scored("crowd", name, true, seconds, found, cutoff=CUTOFF)
 
 
 def scored(
@@ -79,50 +103,50 @@ def scored(
     *,
     cutoff: float,
 ) -> Row:
-    """Of as many steps as there are; from `FROM_STEP` on."""
+    """Return the row of one run, over its scans from `FROM_STEP` on, as far as the run went."""
     pairs = list(zip(found, truth, strict=False))[FROM_STEP - 1 :]
-    distances = [ospa(mine, true, cutoff=cutoff, order=1.0).total for mine, true in pairs]
+    distances = [ospa(estimate, true, cutoff=cutoff, order=1.0).total for estimate, true in pairs]
     median = 1e3 * float(np.median(seconds[FROM_STEP - 1 :]))
-    return Row(scene, name, len(truth[0]), median, float(np.mean(distances)))
+    return Row(scene, name, len(truth[0]), (median,), (float(np.mean(distances)),))
 
 
 # Peers, each in a process of the Python that it is installed for
 
 
-def peer_rows(python: str, peer: str, scene: str, num_targets: int, num_steps: int) -> list[Row] | str:
-    """The rows of a peer's filters; or, in words, why there are none."""
+def peer_rows(python: str, peer: str, scene: str, num_targets: int, num_steps: int, seed: int) -> list[Row] | str:
+    """Return the rows of a peer's filters, or why there are none."""
     if scene == "crowd":
         crowd = GeneratedCrowd(num_targets=num_targets, num_steps=num_steps)
-        _, true, own = prepared(crowd, "lmb")
+        _, true, own = prepared(crowd, "lmb", seed)
         truth, scans = [true.at(k)[1][:, :2] for k in range(num_steps)], [[scan] for scan in own]
         half, cutoff = float(np.sqrt(num_targets / crowd.density) * 500.0), CUTOFF
     else:
-        truth, scans = box_scene(num_targets, num_steps)
+        truth, scans = box_scene(num_targets, num_steps, FIRST_BOX + seed)
         half, cutoff = SIDE, 5.0
-    with tempfile.TemporaryDirectory() as place:
-        given, taken = Path(place) / "scans.npz", Path(place) / "found.npz"
+    with tempfile.TemporaryDirectory() as folder:
+        scans_file, found_file = Path(folder) / "scans.npz", Path(folder) / "found.npz"
         named = {f"{k}_{s}": scan for k, of_all in enumerate(scans) for s, scan in enumerate(of_all)}
-        np.savez(given, **named)  # type: ignore[arg-type]
+        np.savez(scans_file, **named)  # type: ignore[arg-type]
         script = str(Path(__file__).with_name("peer_filters.py"))
-        told = {"peer": peer, "scene": scene, "half": half, "patience": PATIENCE, "number": num_targets}
+        options = {"peer": peer, "scene": scene, "half": half, "patience": PATIENCE, "number": num_targets}
         ended = subprocess.run(
-            [python, script, json.dumps(told), str(given), str(taken)],
+            [python, script, json.dumps(options), str(scans_file), str(found_file)],
             capture_output=True,
             text=True,
             check=False,
             env={name: value for name, value in os.environ.items() if name != "PYTHONPATH"},
         )
         if ended.returncode:
-            return (ended.stderr.strip().splitlines() or ["it ended without a word"])[-1]
-        with np.load(taken) as found:
+            return (ended.stderr.strip().splitlines() or ["it ended without a message"])[-1]
+        with np.load(found_file) as found:
             rows = []
             for name in found["names"].tolist():
                 seconds = found[f"{name}_seconds"].tolist()
-                places = [found[f"{name}_{k}"] for k in range(len(seconds))]
+                positions = [found[f"{name}_{k}"] for k in range(len(seconds))]
                 if len(seconds) < FROM_STEP:
-                    print(f"{peer}, {name}, {num_targets}: {max(seconds):.0f} s a step, given up", flush=True)
+                    print(f"{peer}, {name}, {num_targets}: {max(seconds):.0f} s per step, stopped", flush=True)
                     continue
-                rows.append(scored(scene, f"{peer}, {name}", truth, seconds, places, cutoff=cutoff))
+                rows.append(scored(scene, f"{peer}, {name}", truth, seconds, positions, cutoff=cutoff))
             return rows
 
 
@@ -130,45 +154,47 @@ PEERS = {"Stone Soup": "stonesoup", "multisensor-lmb-filters-rs": "multisensor_l
 
 
 def is_installed(python: str, module: str) -> bool:
-    """Whether that Python has a module."""
+    """Return True if that Python has a module."""
     look = f"import importlib.util as u, sys; sys.exit(u.find_spec({module!r}) is None)"
     return subprocess.run([python, "-c", look], check=False).returncode == 0
 
 
-def all_rows(python: str, sizes: Sequence[int], objects: Sequence[int], num_steps: int) -> Iterator[Row]:
-    """Ours and those of the peers that are there, as they come."""
-    given_up: set[str] = set()
-    there = {peer: is_installed(python, module) for peer, module in PEERS.items()}
-    for peer, found in there.items():
-        if not found:
-            print(f"{peer}: left out, as {PEERS[peer]} is not installed for {Path(python).name}", flush=True)
-    for scene, numbers, ours in (("crowd", sizes, our_crowd), ("8 sensors", objects, our_box)):
-        for number in numbers:
-            yield from ours(number, num_steps)
-            for peer in (peer for peer in PEERS if there[peer] and (peer, scene) not in given_up):
+def all_rows(
+    python: str, sizes: Sequence[int], objects: Sequence[int], num_steps: int, seeds: Sequence[int]
+) -> Iterator[Row]:
+    """Yield a row for each run: every filter in turn on the scans of one seed, then the next seed."""
+    stopped: set[tuple[str, str]] = set()
+    installed = [peer for peer, module in PEERS.items() if is_installed(python, module)]
+    for peer, module in PEERS.items():
+        if peer not in installed:
+            print(f"{peer}: left out, as {module} is not installed for {Path(python).name}", flush=True)
+    for scene, numbers, own in (("crowd", sizes, own_crowd), ("8 sensors", objects, own_box)):
+        for number, seed in product(numbers, seeds):
+            yield from own(number, num_steps, seed)
+            for peer in (peer for peer in installed if (peer, scene) not in stopped):
                 if scene == "8 sensors" and peer == "Stone Soup":
                     continue
-                rows = peer_rows(python, peer, scene, number, num_steps)
+                rows = peer_rows(python, peer, scene, number, num_steps, seed)
                 if isinstance(rows, str):
                     print(f"{peer}, {scene}: left out: {rows}", flush=True)
                 elif rows:
                     yield from rows
                 if not rows or isinstance(rows, str):
-                    given_up.add((peer, scene))
+                    stopped.add((peer, scene))
 
 
 def table(rows: Sequence[Row]) -> str:
-    """As Markdown."""
+    """Return a Markdown table."""
     lines = ["| scene | targets | filter | ms per scan | OSPA, m |", "|---|---:|---|---:|---:|"]
-    lines += [
-        f"| {row.scene} | {row.num_targets:,} | {row.filter} | {row.milliseconds:,.2f} | {row.ospa:.2f} |"
-        for row in rows
-    ]
+    for row in rows:
+        ospa_text = f"{np.mean(row.ospa):.2f}" + (f" ± {row.ospa_error:.2f}" if len(row.ospa) > 1 else "")
+        time = f"{np.median(row.milliseconds):,.2f}"
+        lines.append(f"| {row.scene} | {row.num_targets:,} | {row.filter} | {time} | {ospa_text} |")
     return "\n".join(lines)
 
 
 def draw(rows: Sequence[Row], path: Path) -> None:
-    """Of crowds: OSPA and time against the number of targets, ours beside the peers'."""
+    """Draw time and OSPA of crowds against the number of targets, the default filter on top."""
     import matplotlib
 
     matplotlib.use("Agg")
@@ -178,21 +204,29 @@ def draw(rows: Sequence[Row], path: Path) -> None:
     crowd = [row for row in rows if row.scene == "crowd"]
     for number, name in enumerate(dict.fromkeys(row.filter for row in crowd)):
         own = [row for row in crowd if row.filter == name]
-        numbers = [row.num_targets for row in own]
+        numbers = np.array([row.num_targets for row in own])
+        medians = np.array([np.median(row.milliseconds) for row in own])
+        least, most = ([reach(row.milliseconds) for row in own] for reach in (min, max))
+        is_default = name == DEFAULT
         look = {
             "marker": "osD^vP"[number % 6],
             "color": COLOURS[number % 6],
             "linestyle": line_style(number),
             "label": name,
+            "capsize": 3.0,
+            "linewidth": 2.5 if is_default else 1.5,
+            "zorder": 4 if is_default else 2,
+            "markerfacecolor": COLOURS[number % 6] if is_default else "white",
         }
-        time.plot(numbers, [row.milliseconds for row in own], **look)
-        error.plot(numbers, [row.ospa for row in own], **look)
+        time.errorbar(numbers, medians, [medians - least, most - medians], **look)
+        # Side by side, so that filters of equal OSPA remain visible.
+        shifted = numbers * 1.06 ** (number - 1.5)
+        error.errorbar(shifted, [np.mean(row.ospa) for row in own], [row.ospa_error for row in own], **look)
     time.set(xscale="log", yscale="log", xlabel="targets", ylabel="CPU time per scan (ms)")
-    error.set(
-        xscale="log", xlabel="targets", ylabel="OSPA (m), cutoff 25 m", ylim=(0.0, 1.2 * max(row.ospa for row in crowd))
-    )
-    for each in (time, error):
-        each.grid(True, which="major", alpha=0.4)
+    top = 1.15 * max(float(np.mean(row.ospa)) + row.ospa_error for row in crowd)
+    error.set(xscale="log", xlabel="targets", ylabel="OSPA (m), cutoff 25 m", ylim=(0.0, top))
+    for axes in (time, error):
+        axes.grid(True, which="major", alpha=0.4)
     figure.legend(*time.get_legend_handles_labels(), loc="outside upper center", ncols=2, frameon=False)
     figure.savefig(path, dpi=110)
     print(f"wrote {path}")
@@ -204,16 +238,18 @@ def main() -> None:
     parser.add_argument("--crowd", type=int, nargs="*", default=(10, 30, 100, 300, 1000))
     parser.add_argument("--objects", type=int, nargs="*", default=(10, 20, 50))
     parser.add_argument("--steps", type=int, default=20)
+    parser.add_argument("--seeds", type=int, default=5, help="runs of each size, with other targets and scans")
     parser.add_argument("--figure", type=Path, help="file to draw")
-    given = parser.parse_args()
+    options = parser.parse_args()
     rows = []
-    for row in all_rows(given.peers_python, given.crowd, given.objects, given.steps):
-        print(f"{row.scene:10s} {row.num_targets:6d} {row.filter:40s} {row.milliseconds:10.2f} ms {row.ospa:7.2f} m")
-        sys.stdout.flush()
+    for row in all_rows(options.peers_python, options.crowd, options.objects, options.steps, range(options.seeds)):
+        time, ospa_mean = row.milliseconds[0], row.ospa[0]
+        print(f"{row.scene:10s} {row.num_targets:6d} {row.filter:40s} {time:10.2f} ms {ospa_mean:7.2f} m", flush=True)
         rows.append(row)
+    rows = pooled(rows)
     print(table(rows))
-    if given.figure:
-        draw(rows, given.figure)
+    if options.figure:
+        draw(rows, options.figure)
 
 
 if __name__ == "__main__":
