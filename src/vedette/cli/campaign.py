@@ -25,47 +25,56 @@ if TYPE_CHECKING:
     from vedette.campaigns import Campaign, CampaignOutcome, FailedRun
 
 
+Spec = Annotated[
+    Path,
+    typer.Argument(
+        metavar="SPEC",
+        help="Campaign file (TOML), or a built-in campaign.",
+        autocompletion=completing.campaigns,
+    ),
+]
+Out = Annotated[
+    Path | None, typer.Option("--out", metavar="DIR", help="Results folder; default: named after the campaign.")
+]
+Scheduler = Annotated[
+    str | None,
+    typer.Option(
+        "--scheduler",
+        metavar="ADDRESS",
+        help="Dask scheduler: tcp://host:port or its .json file. --workers: number of workers to wait for.",
+    ),
+]
+Runs = Annotated[
+    int | None, typer.Option("--runs", metavar="N", min=1, help="Number of runs per cell; default: as in the file.")
+]
+RedoDamaged = Annotated[bool, typer.Option("--redo-damaged", help="Rerun results whose checksum does not match.")]
+DryRun = Annotated[bool, typer.Option("--dry-run", help="Print the plan and exit.")]
+ShardNumber = Annotated[
+    str | None,
+    typer.Option(
+        "--shard", metavar="NUMBER/COUNT", help="Run one share of the campaign (e.g. 17/1000) in its own folder."
+    ),
+]
+NumSlurmTasks = Annotated[
+    int | None,
+    typer.Option("--slurm", metavar="COUNT", min=1, help="Print a Slurm job array with COUNT shards and exit."),
+]
+SlurmTime = Annotated[
+    str | None, typer.Option("--time", metavar="TIME", help="Time limit of each Slurm task: 4h, 90m, 1d12h.")
+]
+
+
 def campaign(
-    spec: Annotated[
-        Path,
-        typer.Argument(
-            metavar="SPEC",
-            help="Campaign file (TOML), or a built-in campaign.",
-            autocompletion=completing.campaigns,
-        ),
-    ],
-    out: Annotated[
-        Path | None, typer.Option("--out", metavar="DIR", help="Results folder; default: named after the campaign.")
-    ] = None,
+    spec: Spec,
+    out: Out = None,
     workers: Workers = 0,
-    scheduler: Annotated[
-        str | None,
-        typer.Option(
-            "--scheduler",
-            metavar="ADDRESS",
-            help="Dask scheduler: tcp://host:port or its .json file. --workers: number of workers to wait for.",
-        ),
-    ] = None,
-    runs: Annotated[
-        int | None, typer.Option("--runs", metavar="N", min=1, help="Number of runs per cell; default: as in the file.")
-    ] = None,
-    redo_damaged: Annotated[
-        bool, typer.Option("--redo-damaged", help="Rerun results whose checksum does not match.")
-    ] = False,
-    dry_run: Annotated[bool, typer.Option("--dry-run", help="Print the plan and exit.")] = False,
-    shard: Annotated[
-        str | None,
-        typer.Option(
-            "--shard", metavar="NUMBER/COUNT", help="Run one share of the campaign (e.g. 17/1000) in its own folder."
-        ),
-    ] = None,
-    slurm: Annotated[
-        int | None,
-        typer.Option("--slurm", metavar="COUNT", min=1, help="Print a Slurm job array with COUNT shards and exit."),
-    ] = None,
-    time: Annotated[
-        str | None, typer.Option("--time", metavar="TIME", help="Time limit of each Slurm task: 4h, 90m, 1d12h.")
-    ] = None,
+    scheduler: Scheduler = None,
+    runs: Runs = None,
+    redo_damaged: RedoDamaged = False,
+    dry_run: DryRun = False,
+    shard: ShardNumber = None,
+    slurm: NumSlurmTasks = None,
+    time: SlurmTime = None,
     trust: Trust = False,
 ) -> None:
     """Run a campaign, or resume one.
@@ -79,6 +88,20 @@ def campaign(
         raise usage_error("expected without --slurm, which gives each task its shard", "--shard")
     if scheduler is None and not dry_run and slurm is None:
         load_workers(workers)
+    resolved = _read_campaign(spec, runs, shard, trust)
+    folder = out or Path(resolved.default_folder if (shard or slurm) is None else resolved.default_shards)
+    if dry_run:
+        _print_plan(resolved)
+    elif slurm is not None and time is not None:
+        options = [*([f"--runs={runs}"] if runs else []), *(["--allow-code"] if trust else [])]
+        _print_job(resolved, slurm, time, folder, ["vedette", "campaign", str(spec), "--out", str(folder), *options])
+    else:
+        own_folder = folder if shard is None else folder / resolved.shard.folder
+        outcome = run_with_progress(resolved, own_folder, workers, scheduler, redo_damaged)
+        _print_outcome(resolved, outcome, own_folder, shards=None if shard is None else folder)
+
+
+def _read_campaign(spec: Path, runs: int | None, shard: str | None, trust: bool) -> Campaign:
     gc.disable()
     from vedette.campaigns import load_spec, parse_shard, resolve
 
@@ -90,26 +113,22 @@ def campaign(
     if shard is not None:
         with option_errors({"shard": "--shard"}):
             resolved = replace(resolved, shard=parse_shard(shard))
-    if dry_run:
-        _print_plan(resolved)
-        return
-    folder = out or Path(resolved.default_folder if (shard or slurm) is None else resolved.default_shards)
-    if slurm is not None and time is not None:
-        options = [*([f"--runs={runs}"] if runs else []), *(["--allow-code"] if trust else [])]
-        _print_job(resolved, slurm, time, ["vedette", "campaign", str(spec), "--out", str(folder), *options])
-        return
-    if shard is not None:
-        folder = folder / resolved.shard.folder
-    outcome = run_with_progress(resolved, folder, workers, scheduler, redo_damaged)
+    return resolved
+
+
+def _print_outcome(campaign: Campaign, outcome: CampaignOutcome, folder: Path, *, shards: Path | None) -> None:
+    """Print the number of finished runs and the next command; shards: the folder of all shards, None: no shard."""
     finished = outcome.num_completed + outcome.num_existing
-    echo(f"{folder}: {finished} of {resolved.total} runs")
-    place = shlex.quote(str(folder if shard is None else folder.parent))
-    echo(f"next: vedette {f'results {place}; vedette report' if shard is None else 'merge'} {place}")
+    echo(f"{folder}: {finished} of {campaign.total} runs")
+    if shards is None:
+        echo(f"next: vedette results {shlex.quote(str(folder))}; vedette report {shlex.quote(str(folder))}")
+    else:
+        echo(f"next: vedette merge {shlex.quote(str(shards))}")
     emit_json(
         {
-            "campaign": resolved.name,
+            "campaign": campaign.name,
             "folder": folder,
-            "runs": resolved.total,
+            "runs": campaign.total,
             "finished": finished,
             "failed": [asdict(each) for each in outcome.failed],
         }
@@ -117,11 +136,11 @@ def campaign(
     report_failures(outcome.failed)
 
 
-def _print_job(campaign: Campaign, count: int, time: str, command: list[str]) -> None:
+def _print_job(campaign: Campaign, count: int, time: str, folder: Path, command: list[str]) -> None:
     from vedette.campaigns.cells import safe_name
     from vedette.campaigns.shards import slurm_script
 
-    merge = shlex.join(["vedette", "merge", command[4], "--out", campaign.default_folder])
+    merge = shlex.join(["vedette", "merge", str(folder), "--out", campaign.default_folder])
     with option_errors({"time": "--time", "shard": "--slurm"}):
         script = slurm_script(safe_name(campaign.name), count, time, shlex.join([*command, "--workers=1"]), merge)
     echo(script.rstrip("\n"))

@@ -5,7 +5,7 @@ from __future__ import annotations
 import contextlib
 import hashlib
 import sys
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 
@@ -22,92 +22,99 @@ from vedette.cli.scenario_files import print_warnings
 from vedette.internal.extras import require_packages
 
 if TYPE_CHECKING:
-    from vedette.live import PersistentLoop
+    from vedette.live import LineServer, LiveLoop, LiveState, PersistentLoop
     from vedette.reports.live import LiveScreen
+    from vedette.scenarios.from_recording import LiveScenario
+
+
+SensorsOrScenario = Annotated[Path, typer.Option("--sensors", metavar="FILE", help="Sensors file or scenario (YAML).")]
+MaxDelay = Annotated[
+    float,
+    typer.Option(
+        "--max-delay", metavar="SECONDS", min=0.001, help="Accept scans up to this late; older ones are dropped."
+    ),
+]
+MaxLead = Annotated[
+    float,
+    typer.Option(
+        "--max-lead",
+        metavar="SECONDS",
+        min=0.001,
+        help="Reject a time stamp further ahead than this, unless several sensors agree.",
+    ),
+]
+PlannerName = Annotated[
+    str,
+    typer.Option(
+        "--planner",
+        metavar="NAME",
+        help='Planner, as in `vedette run`; "stationary": no decisions.',
+        autocompletion=strategies,
+    ),
+]
+DecideEvery = Annotated[
+    float | None,
+    typer.Option(
+        "--decide-every",
+        metavar="SECONDS",
+        min=0.001,
+        help="Interval between decisions; default: `control` in the scenario.",
+    ),
+]
+PlanningTimeout = Annotated[
+    float | None,
+    typer.Option(
+        "--planning-timeout",
+        metavar="SECONDS",
+        min=0.001,
+        help="Use the best action found so far after this time; default: no limit.",
+    ),
+]
+Snapshot = Annotated[
+    Path | None,
+    typer.Option(
+        "--snapshot", metavar="FILE", help="Save the state to FILE regularly, and resume from it if it exists."
+    ),
+]
+SnapshotInterval = Annotated[
+    float, typer.Option("--snapshot-interval", metavar="SECONDS", min=0.0, help="Interval between snapshots.")
+]
+Record = Annotated[
+    Path | None,
+    typer.Option("--record", metavar="FILE", help="Append every input line to FILE; replayed on resume."),
+]
+Listen = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--listen",
+        metavar="ADDRESS",
+        help="stdin (default), tcp://HOST:PORT, or ws://HOST:PORT (also serves a web page). May be repeated.",
+    ),
+]
+Token = Annotated[
+    str | None,
+    typer.Option(
+        "--token",
+        metavar="TEXT",
+        envvar="VEDETTE_TOKEN",
+        help="Token that clients must send. Required for addresses other than loopback.",
+    ),
+]
 
 
 def live(
-    sensors: Annotated[
-        Path,
-        typer.Option("--sensors", metavar="FILE", help="Sensors file or scenario (YAML)."),
-    ],
-    max_delay: Annotated[
-        float,
-        typer.Option(
-            "--max-delay",
-            metavar="SECONDS",
-            min=0.001,
-            help="Accept scans up to this late; older ones are dropped.",
-        ),
-    ] = 30.0,
-    max_lead: Annotated[
-        float,
-        typer.Option(
-            "--max-lead",
-            metavar="SECONDS",
-            min=0.001,
-            help="Reject a time stamp further ahead than this, unless several sensors agree.",
-        ),
-    ] = 60.0,
+    sensors: SensorsOrScenario,
+    max_delay: MaxDelay = 30.0,
+    max_lead: MaxLead = 60.0,
     speed: Speed = 10.0,
-    planner: Annotated[
-        str,
-        typer.Option(
-            "--planner",
-            metavar="NAME",
-            help='Planner, as in `vedette run`; "stationary": no decisions.',
-            autocompletion=strategies,
-        ),
-    ] = "jdm",
-    decide_every: Annotated[
-        float | None,
-        typer.Option(
-            "--decide-every",
-            metavar="SECONDS",
-            min=0.001,
-            help="Interval between decisions; default: `control` in the scenario.",
-        ),
-    ] = None,
-    planning_timeout: Annotated[
-        float | None,
-        typer.Option(
-            "--planning-timeout",
-            metavar="SECONDS",
-            min=0.001,
-            help="Use the best action found so far after this time; default: no limit.",
-        ),
-    ] = None,
-    snapshot: Annotated[
-        Path | None,
-        typer.Option(
-            "--snapshot", metavar="FILE", help="Save the state to FILE regularly, and resume from it if it exists."
-        ),
-    ] = None,
-    snapshot_interval: Annotated[
-        float,
-        typer.Option("--snapshot-interval", metavar="SECONDS", min=0.0, help="Interval between snapshots."),
-    ] = 10.0,
-    record: Annotated[
-        Path | None,
-        typer.Option("--record", metavar="FILE", help="Append every input line to FILE; replayed on resume."),
-    ] = None,
-    listen: Annotated[
-        list[str] | None,
-        typer.Option(
-            "--listen",
-            metavar="ADDRESS",
-            help="stdin (default), tcp://HOST:PORT, or ws://HOST:PORT (also serves a web page). May be repeated.",
-        ),
-    ] = None,
-    token: Annotated[
-        str | None,
-        typer.Option(
-            "--token",
-            metavar="TEXT",
-            envvar="VEDETTE_TOKEN",
-            help="Token that clients must send. Required for addresses other than loopback.",
-        ),
-    ] = None,
+    planner: PlannerName = "jdm",
+    decide_every: DecideEvery = None,
+    planning_timeout: PlanningTimeout = None,
+    snapshot: Snapshot = None,
+    snapshot_interval: SnapshotInterval = 10.0,
+    record: Record = None,
+    listen: Listen = None,
+    token: Token = None,
     seed: Seed = 0,
     trust: Trust = False,
 ) -> None:
@@ -115,47 +122,95 @@ def live(
 
     Reads one JSON line per scan; writes estimates, and plans when a decision is due.
     """
-    from vedette.live import PersistentLoop, build_live_loop
-    from vedette.live.server import check_address
+    sources = _parse_sources(listen or ["stdin"], token)
+    options = _LoopOptions(max_delay, max_lead, speed, planner, decide_every, planning_timeout, seed)
+    live_scenario = _read_scenario(sensors, options, trust)
+    loop = _build_loop(live_scenario, options)
+    identity = _digest(options, loop, sensors)
+    screen = None
+    if any(source.kind == "ws" for source in sources):
+        screen = _open_screen(live_scenario, loop, lambda: persistent.state)
+        loop = screen.live
+    with interruptible("what came is kept where --snapshot or --record say so"):
+        compile_if_cold(live_scenario.scenario)
+        persistent = _open_storage(loop, identity, snapshot, snapshot_interval, record)
+        _process(persistent, screen, sources, token)
+    emit_json(_document(persistent))
+
+
+class _LoopOptions(NamedTuple):
+    """Options that change the answers; a snapshot or record made with others is refused."""
+
+    max_delay: float
+    max_lead: float
+    speed: float
+    planner: str
+    decide_every: float | None
+    planning_timeout: float | None
+    seed: int
+
+
+def _read_scenario(sensors: Path, options: _LoopOptions, trust: bool) -> LiveScenario:
     from vedette.scenarios.from_recording import scenario_from_sensors
 
-    sources = [_parse_source(address) for address in listen or ["stdin"]]
-    for source in sources:
-        if source.kind != "stdin":
-            check_address(source.host, token)
-    if any(source.kind == "ws" for source in sources):
-        require_packages("vedette live --listen ws://", "websockets", "jinja2", "matplotlib", "pyarrow")
-    live_scenario = scenario_from_sensors(sensors, speed=speed, decide_every=decide_every, plan_within=planning_timeout)
-    check_planner(live_scenario.scenario, planner, "--planner")
+    live_scenario = scenario_from_sensors(
+        sensors, speed=options.speed, decide_every=options.decide_every, plan_within=options.planning_timeout
+    )
+    check_planner(live_scenario.scenario, options.planner, "--planner")
     CodeTrust(trust)(live_scenario.scenario)
     print_warnings(live_scenario.scenario)
     note_assumptions(live_scenario.assumed, sensors)
-    loop = build_live_loop(
-        live_scenario, planner, max_delay=max_delay, max_lead=max_lead, decide_every=decide_every, seed=seed
-    )
-    screen = None
-    if any(source.kind == "ws" for source in sources):
-        from vedette.reports.live import LiveScreen
+    return live_scenario
 
-        screen = LiveScreen(live_scenario.scenario, loop, lambda: persistent.state)
-        loop = screen.live
-    options = (max_delay, max_lead, speed, planner if loop.planner else "", decide_every, planning_timeout, seed)
-    identity = hashlib.sha256(repr(options).encode() + sensors.read_bytes()).hexdigest()
+
+def _build_loop(live_scenario: LiveScenario, options: _LoopOptions) -> LiveLoop:
+    from vedette.live import build_live_loop
+
+    return build_live_loop(
+        live_scenario,
+        options.planner,
+        max_delay=options.max_delay,
+        max_lead=options.max_lead,
+        decide_every=options.decide_every,
+        seed=options.seed,
+    )
+
+
+def _digest(options: _LoopOptions, loop: LiveLoop, sensors: Path) -> str:
+    """Return the identity of a loop: a digest of its options and of the sensors file."""
+    in_use = options if loop.planner else options._replace(planner="")
+    return hashlib.sha256(repr(tuple(in_use)).encode() + sensors.read_bytes()).hexdigest()
+
+
+def _open_screen(live_scenario: LiveScenario, loop: LiveLoop, state: Callable[[], LiveState]) -> LiveScreen:
+    from vedette.reports.live import LiveScreen
+
+    return LiveScreen(live_scenario.scenario, loop, state)
+
+
+def _open_storage(
+    loop: LiveLoop, identity: str, snapshot: Path | None, interval: float, record: Path | None
+) -> PersistentLoop:
+    from vedette.live import PersistentLoop
+
+    return PersistentLoop(
+        loop, identity=identity, snapshot=snapshot, snapshot_interval=interval, record=record, report=note
+    )
+
+
+def _process(
+    persistent: PersistentLoop, screen: LiveScreen | None, sources: Sequence[_Source], token: str | None
+) -> None:
+    """Answer the lines of the record again, then those that arrive."""
     import asyncio
 
-    with interruptible("what came is kept where --snapshot or --record say so"):
-        compile_if_cold(live_scenario.scenario)
-        persistent = PersistentLoop(
-            loop, identity=identity, snapshot=snapshot, snapshot_interval=snapshot_interval, record=record, report=note
-        )
-        try:
-            with compiling():
-                for answers in persistent.resume():
-                    _print_answers(answers)
-                asyncio.run(_listen(persistent, screen, sources, token))
-        finally:
-            persistent.close()
-    emit_json(_document(persistent))
+    try:
+        with compiling():
+            for answers in persistent.resume():
+                _print_answers(answers)
+            asyncio.run(_listen(persistent, screen, sources, token))
+    finally:
+        persistent.close()
 
 
 class _Source(NamedTuple):
@@ -164,6 +219,19 @@ class _Source(NamedTuple):
     kind: str
     host: str = ""
     port: int = 0
+
+
+def _parse_sources(addresses: Sequence[str], token: str | None) -> list[_Source]:
+    """Return the sources of lines; raise if an address needs a token or a package that is missing."""
+    from vedette.live.server import check_address
+
+    sources = [_parse_source(address) for address in addresses]
+    for source in sources:
+        if source.kind != "stdin":
+            check_address(source.host, token)
+    if any(source.kind == "ws" for source in sources):
+        require_packages("vedette live --listen ws://", "websockets", "jinja2", "matplotlib", "pyarrow")
+    return sources
 
 
 def _parse_source(listen: str) -> _Source:
@@ -189,7 +257,7 @@ async def _listen(
     """Process lines until standard input ends, or until Ctrl-C if there are clients; do not wait for them."""
     import asyncio
 
-    from vedette.live import LineServer, TcpServer, iter_lines
+    from vedette.live import LineServer, iter_lines
 
     def process(line: bytes) -> Iterable[dict[str, Any]]:
         answers = persistent.process(line)
@@ -201,26 +269,31 @@ async def _listen(
     line_server = LineServer(process, token, note)
     async with contextlib.AsyncExitStack() as servers:
         for source in sources:
-            if source.kind == "tcp":
-                server: Any = await TcpServer(line_server).listen(source.host, source.port)
-            elif screen is not None and source.kind == "ws":
-                from vedette.live.web import WebServer
-
-                server = await WebServer(line_server, screen, source.host).listen(source.port)
-            else:
-                continue
-            servers.callback(server.close)
-            host, port = server.sockets[0].getsockname()[:2]
-            address = f"[{host}]:{port}" if ":" in host else f"{host}:{port}"
-            note(
-                f"listens on {source.kind}://{address}"
-                + (f"; the page is http://{address}/" if source.kind == "ws" else "")
-            )
+            if source.kind != "stdin":
+                servers.callback(await _start_server(source, line_server, screen))
         if any(source.kind == "stdin" for source in sources):
             async for line in iter_lines(sys.stdin.buffer):
                 await line_server.answer(line, None)
         if any(source.kind != "stdin" for source in sources):
             await asyncio.Event().wait()
+
+
+async def _start_server(source: _Source, line_server: LineServer, screen: LiveScreen | None) -> Callable[[], None]:
+    """Start a server of clients, print its address, and return the function that closes it."""
+    from vedette.live import TcpServer
+
+    server: Any
+    if source.kind == "ws" and screen is not None:
+        from vedette.live.web import WebServer
+
+        server = await WebServer(line_server, screen, source.host).listen(source.port)
+    else:
+        server = await TcpServer(line_server).listen(source.host, source.port)
+    host, port = server.sockets[0].getsockname()[:2]
+    address = f"[{host}]:{port}" if ":" in host else f"{host}:{port}"
+    note(f"listens on {source.kind}://{address}" + (f"; the page is http://{address}/" if source.kind == "ws" else ""))
+    close: Callable[[], None] = server.close
+    return close
 
 
 def _document(persistent: PersistentLoop) -> dict[str, Any]:
