@@ -38,18 +38,18 @@ def read_ais(file: Path) -> tuple[dict[str, list[Any]], list[int], tuple[str, ..
         for number, line in enumerate(source, start=1):
             try:
                 part = _part(line.strip(), number)
-                found = None if part is None else _position(open_ones.joined(part))
+                position = None if part is None else _position(open_ones.joined(part))
             except ValueError as fault:
                 lost.setdefault(str(fault), []).append(number)
             else:
-                if found is not None:
-                    rows.append(found)
+                if position is not None:
+                    rows.append(position)
                     lines.append(number)
     if incomplete := open_ones.left():
         lost["of messages that are not complete"] = incomplete
     if not rows:
-        wanted = r"AIS positions with times: `\c:1452603741*54\!AIVDM,...`, `2016-01-12T13:02:21Z !AIVDM,...` or "
-        raise InputError(f"{file}: expected {wanted}`!AIVDM,...*5C,1452603741`; got {_lost_in_words(lost) or 'none'}")
+        expected = r"AIS positions with times: `\c:1452603741*54\!AIVDM,...`, `2016-01-12T13:02:21Z !AIVDM,...` or "
+        raise InputError(f"{file}: expected {expected}`!AIVDM,...*5C,1452603741`; got {_lost_in_words(lost) or 'none'}")
     names = ("time", "id", "longitude", "latitude")
     columns: dict[str, list[Any]] = {name: [row[place] for row in rows] for place, name in enumerate(names)}
     if all(row[4] is not None for row in rows):
@@ -157,21 +157,21 @@ def _position(parts: list[_Part]) -> tuple[Any, ...] | None:
     if not parts:
         return None
     try:
-        said = AISSentence.assemble_from_iterable([part.sentence for part in parts]).decode().asdict()
+        message = AISSentence.assemble_from_iterable([part.sentence for part in parts]).decode().asdict()
     except (AISBaseException, TypeError, ValueError):
         raise ValueError("damaged") from None
-    lon, lat = said.get("lon"), said.get("lat")
+    lon, lat = message.get("lon"), message.get("lat")
     if not (isinstance(lon, float) and isinstance(lat, float) and abs(lon) <= 180.0 and abs(lat) <= 90.0):
         return None
     time = next((part.time for part in parts if part.time is not None), None)
     if time is None or not math.isfinite(time):
         raise ValueError("with a position but no time")
-    return time / 1000.0 if time > _MILLISECONDS else time, str(said["mmsi"]), lon, lat, _velocity(said)
+    return time / 1000.0 if time > _MILLISECONDS else time, str(message["mmsi"]), lon, lat, _velocity(message)
 
 
-def _velocity(said: dict[str, Any]) -> tuple[float, float] | None:
+def _velocity(message: dict[str, Any]) -> tuple[float, float] | None:
     """Return the velocity to the east and north, m/s; None if unknown."""
-    speed, course = said.get("speed"), said.get("course")
+    speed, course = message.get("speed"), message.get("course")
     if speed is None or course is None or speed >= _NO_SPEED or course >= _NO_COURSE:
         return None
     angle = math.radians(course)

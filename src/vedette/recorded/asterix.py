@@ -52,20 +52,20 @@ def read_asterix(file: Path, *, reports: bool = False) -> AsterixTable:
         InputError: bytes that are not ASTERIX, or contain no plots and tracks.
     """
     require_packages(f"{file}, which is an ASTERIX file,", "asterix")
-    found: dict[int, tuple[list[dict[str, Any]], list[int]]] = {name: ([], []) for name in _READ}
-    days, without = dict.fromkeys(found, 0.0), list[int]()
+    records: dict[int, tuple[list[dict[str, Any]], list[int]]] = {name: ([], []) for name in _READ}
+    days, left_out_categories = dict.fromkeys(records, 0.0), list[int]()
     for number, (category, record) in enumerate(_records(file), start=1):
         row = _READ[category](record)
         if row is None:
-            without.append(category)
+            left_out_categories.append(category)
             continue
-        rows, numbers = found[category]
+        rows, numbers = records[category]
         if rows and row["time"] + days[category] < rows[-1]["time"] - _HALF_DAY:  # midnight
             days[category] += 2.0 * _HALF_DAY
         rows.append({**row, "time": row["time"] + days[category]})
         numbers.append(number)
-    read = _TRACKS if reports or not found[_PLOTS][0] else _PLOTS
-    rows, numbers = found[read]
+    read = _TRACKS if reports or not records[_PLOTS][0] else _PLOTS
+    rows, numbers = records[read]
     if not numbers:
         raise InputError(
             f"{file}: expected {'' if reports else 'plots of category 048 or '}tracks of category 062; got none"
@@ -73,25 +73,25 @@ def read_asterix(file: Path, *, reports: bool = False) -> AsterixTable:
     columns: dict[str, list[Any]] = {name: [row[name] for row in rows] for name in rows[0]}
     slant = sum(columns.pop("is_slant", []))
     notes = () if not slant else (_of_slant_ranges(slant, len(numbers)),)
-    if left := without.count(read):
-        notes = (*notes, f"left out: {pluralise(left, 'record')} of category {read:03} without a time or place")
+    if num_left_out := left_out_categories.count(read):
+        notes = (*notes, f"left out: {pluralise(num_left_out, 'record')} of category {read:03} without a time or place")
     for name in ("range_rate_mps", "altitude_m"):
         if set(columns.get(name, ())) == {None}:
             del columns[name]
-    kept = {name: cells for name, cells in columns.items() if name not in ("vx", "vy") or None not in cells}
-    return AsterixTable(kept, numbers, notes, _service_of(found[_SERVICE][0]))
+    complete_columns = {name: cells for name, cells in columns.items() if name not in ("vx", "vy") or None not in cells}
+    return AsterixTable(complete_columns, numbers, notes, _service_of(records[_SERVICE][0]))
 
 
 def _service_of(messages: list[dict[str, Any]]) -> dict[str, RadarService]:
     """Return for each radar its turn, from messages of one radar in order of time."""
-    found: dict[str, RadarService] = {}
+    services: dict[str, RadarService] = {}
     for radar in dict.fromkeys(message["sensor"] for message in messages):
         own = [message for message in messages if message["sensor"] == radar]
         norths = np.array([message["time"] for message in own if message["kind"] == _NORTH])
         periods = [message["period"] for message in own if message["period"]] or np.diff(norths).tolist()
         if periods and (period := float(np.median(periods))) > 0.0:
-            found[radar] = RadarService(Turn(period), own[0]["time"], own[-1]["time"])
-    return found
+            services[radar] = RadarService(Turn(period), own[0]["time"], own[-1]["time"])
+    return services
 
 
 def _of_slant_ranges(number: int, total: int) -> str:
@@ -116,8 +116,8 @@ def _records(file: Path) -> Iterator[tuple[int, Any]]:
             continue
         records = editions[category][-1].cv_uap.parse(block.get_raw_records())  # by the newest edition
         if isinstance(records, ValueError):
-            wanted = f"records of category {category:03} in data block {place}"
-            raise InputError(f"{file}: expected {wanted}; got {shown(str(records))}")
+            expected = f"records of category {category:03} in data block {place}"
+            raise InputError(f"{file}: expected {expected}; got {shown(str(records))}")
         yield from ((category, record) for record in records)
 
 

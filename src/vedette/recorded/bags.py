@@ -36,8 +36,10 @@ def read_bag(file: Path, *, reports: bool) -> tuple[dict[str, list[Any]], list[i
             for place in _places(message):
                 rows.append((number, stamp.sec + 1e-9 * stamp.nanosec, topic, place))
     except Exception as error:  # a damaged bag may raise any error in the packages that read it
-        said = elided(printable(" ".join(str(error).split())), 200)
-        raise InputError(f"{file}: expected a ROS 2 bag; it cannot be read: {type(error).__name__}: {said}") from error
+        reason = elided(printable(" ".join(str(error).split())), 200)
+        raise InputError(
+            f"{file}: expected a ROS 2 bag; it cannot be read: {type(error).__name__}: {reason}"
+        ) from error
     if not rows:
         raise InputError(f"{file}: expected messages {' or '.join(kinds)}; got none")
     dates, epoch = min(row[1] for row in rows) > _FIRST_DATE, datetime.fromtimestamp(0, UTC)

@@ -53,8 +53,8 @@ class CleaningCounts:
             "tracks of a single report": self.short_tracks,
             "slow tracks": self.slow_tracks,
         }
-        found = ", ".join(f"{number} {what}" for what, number in removed.items() if number)
-        return f"{pluralise(self.reports, 'report')} ({found or 'none removed'})"
+        removed_text = ", ".join(f"{number} {what}" for what, number in removed.items() if number)
+        return f"{pluralise(self.reports, 'report')} ({removed_text or 'none removed'})"
 
 
 @dataclass(frozen=True, slots=True)
@@ -111,10 +111,10 @@ class Cleaning:
     def _runs(self, reports: Reports, rows: Ints) -> Iterator[Ints]:
         """Yield runs of reports without a silence and without a report outside the region."""
         inside = np.ones(len(rows), np.bool_) if self.region is None else self.region.contains(reports.positions[rows])
-        kept = np.flatnonzero(inside)
-        left_region = np.diff(kept) > 1
-        silent = np.diff(reports.times[rows[kept]]) > self.max_gap
-        for run in np.split(kept, np.flatnonzero(left_region | silent) + 1):
+        inside_rows = np.flatnonzero(inside)
+        left_region = np.diff(inside_rows) > 1
+        silent = np.diff(reports.times[rows[inside_rows]]) > self.max_gap
+        for run in np.split(inside_rows, np.flatnonzero(left_region | silent) + 1):
             if len(run):
                 yield rows[run]
 
@@ -125,9 +125,9 @@ def longest_reachable(times: Floats, positions: Floats, max_speed: float) -> Int
     Reachability is transitive, so the longest chain over pairs in order is exact; a bad first report cannot remove the
     good ones.
     """
-    num = len(times)
-    length, previous = np.ones(num, np.int64), np.full(num, -1)
-    for i in range(1, num):
+    num_reports = len(times)
+    length, previous = np.ones(num_reports, np.int64), np.full(num_reports, -1)
+    for i in range(1, num_reports):
         distances = np.hypot(*(positions[:i] - positions[i]).T)
         # The last of the longest: without jumps this is the previous report.
         lengths = np.where(distances <= max_speed * (times[i] - times[:i]), length[:i], 0)

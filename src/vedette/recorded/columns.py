@@ -30,8 +30,8 @@ class ScanColumns:
         self.bearings = tuple(conventions.bearings or ("north" if site.compass else table.bearings) for site in sites)
         self._columns: dict[str, tuple[str, float]] = {}
         for quantity, units in UNITS.items():
-            if (found := self._found(quantity, units)) is not None:
-                self._columns[quantity] = found
+            if (column := self._found(quantity, units)) is not None:
+                self._columns[quantity] = column
         self._time = self._plain("time")
         self._sensor = self._plain("sensor") if len(sites) > 1 or self._has_sensor() else None
         self._numbers = {site.name: s for s, site in enumerate(sites)} | {
@@ -88,9 +88,11 @@ class ScanColumns:
         """
         if {*OWN_SPEEDS} <= set(self._columns):
             return ()
-        what = "measures range rates and moves, but its velocity is not given: they are taken as relative to the ground"
+        reason = (
+            "measures range rates and moves, but its velocity is not given: they are taken as relative to the ground"
+        )
         return tuple(
-            f"{site.name} {what} (columns {', '.join(OWN_SPEEDS)})"
+            f"{site.name} {reason} (columns {', '.join(OWN_SPEEDS)})"
             for s, site in enumerate(self.sites)
             if is_doppler(site.kind) and np.ptp(poses[:, s, :2], axis=0).any()
         )
@@ -126,8 +128,8 @@ class ScanColumns:
         if given is None and not ends and units is ANGLES:
             if self._told_by_compass(quantity):
                 return ANGLES["deg"]
-            wanted = f"a unit of {quantity}: a column {quantity}_deg or {quantity}_rad, or units: {{{quantity}: deg}}"
-            raise InputError(f"{self.table.source}, column {shown(name)}: expected {wanted}; got none")
+            expected = f"a unit of {quantity}: a column {quantity}_deg or {quantity}_rad, or units: {{{quantity}: deg}}"
+            raise InputError(f"{self.table.source}, column {shown(name)}: expected {expected}; got none")
         return units[given or (ends[0] if ends else next(iter(units)))]
 
     def _told_by_compass(self, quantity: str) -> bool:
@@ -144,19 +146,19 @@ class ScanColumns:
                 raise reject(f"sensor {site.name}", f"measurements of kind {', '.join(COMPONENTS)}", site.kind)
             for quantity in COMPONENTS[site.kind]:
                 if quantity not in self._columns and not (quantity in ("x", "y") and geographic):
-                    wanted = f"a column of {quantity}, as sensor {shown(site.name)} measures {site.kind}"
-                    raise InputError(f"{self.table.source}: expected {wanted}; got columns {have}")
+                    expected = f"a column of {quantity}, as sensor {shown(site.name)} measures {site.kind}"
+                    raise InputError(f"{self.table.source}: expected {expected}; got columns {have}")
         angles = {"bearing", "own_heading"} & set(self._columns)
         if angles and any(
             bearings is None and ("own_heading" in angles or "bearing" in COMPONENTS[site.kind])
             for site, bearings in zip(self.sites, self.bearings, strict=True)
         ):
-            wanted = "bearings: north (clockwise, a compass) or east (counter-clockwise)"
+            expected = "bearings: north (clockwise, a compass) or east (counter-clockwise)"
             name = shown(self._columns[min(angles)][0])
-            raise InputError(f"{self.table.source}, column {name}: expected {wanted}; got none")
+            raise InputError(f"{self.table.source}, column {name}: expected {expected}; got none")
         if {"lon", "lat", "own_lon", "own_lat"} & set(self._columns) and self.origin is None:
-            wanted = "an origin {lon: , lat: } for longitudes and latitudes"
-            raise InputError(f"{self.table.source}: expected {wanted}; got none")
+            expected = "an origin {lon: , lat: } for longitudes and latitudes"
+            raise InputError(f"{self.table.source}: expected {expected}; got none")
 
         self._check_places()
 
@@ -169,8 +171,8 @@ class ScanColumns:
             there = [name for name in pair if name in self._columns]
             if len(there) == 1:
                 (missing,) = set(pair) - set(there)
-                wanted = (
+                expected = (
                     f"a column of {missing} beside it, as a {'velocity' if pair is OWN_SPEEDS else 'place'} has both"
                 )
                 name = shown(self._columns[there[0]][0])
-                raise InputError(f"{self.table.source}, column {name}: expected {wanted}; got none")
+                raise InputError(f"{self.table.source}, column {name}: expected {expected}; got none")

@@ -44,8 +44,8 @@ def table_of_detections(
     columns |= {_COLUMNS[name]: [] for name in quantities if name is not None}
     places, numbers = list[Place | None](), list[int]()
     for number, pair in enumerate(reader, start=1):
-        time, found = _pair(pair, number)
-        rows = [_row(each, quantities, sensor, f"scan {number}, detection {k}") for k, each in found]
+        time, detections = _pair(pair, number)
+        rows = [_row(each, quantities, sensor, f"scan {number}, detection {k}") for k, each in detections]
         if not rows and sensor is not None:
             rows = [(sensor, (), None)]
         for name, values, own in sorted(rows, key=lambda row: row[:2]):  # a set has no order
@@ -58,16 +58,16 @@ def table_of_detections(
         cells = list(columns.values())[2]  # cells of empty scans before all others
         places[: known[0]] = [places[known[0]] if cell is None else None for cell in cells[: known[0]]]
         if None in places:
-            wanted = "a measurement_model with a translation_offset, as others have"
-            raise InputError(f"detections, scan {numbers[places.index(None)]}: expected {wanted}; got none")
+            expected = "a measurement_model with a translation_offset, as others have"
+            raise InputError(f"detections, scan {numbers[places.index(None)]}: expected {expected}; got none")
         columns |= {f"own_{axis}": [place[k] for place in places if place] for k, axis in enumerate("xy")}
     return Table(columns, numbers, "detections", "east")
 
 
 def _pair(pair: Any, number: int) -> tuple[Any, list[tuple[int, Any]]]:
     try:
-        time, found = pair
-        return time, list(enumerate(found, start=1))
+        time, detections = pair
+        return time, list(enumerate(detections, start=1))
     except (TypeError, ValueError):
         raise InputError(f"detections, scan {number}: expected a time and detections; got {shown(str(pair))}") from None
 
@@ -78,10 +78,10 @@ def _row(
     """Return the sensor, the elements of the state vector that are used, and the position of the sensor."""
     name = sensor
     if name is None:
-        told = getattr(detection, "metadata", None) or {}
-        if "sensor" not in told:
+        metadata = getattr(detection, "metadata", None) or {}
+        if "sensor" not in metadata:
             raise InputError(f"detections, {place}, metadata: expected a sensor, as no other is named; got none")
-        name = str(told["sensor"])
+        name = str(metadata["sensor"])
     model = getattr(detection, "measurement_model", None)
     values = elements_of(detection, quantities, model, f"detections, {place}")
     offset = getattr(model, "translation_offset", None)
@@ -102,8 +102,8 @@ def elements_of(detection: Any, quantities: Sequence[str | None], model: Any, pl
     except (TypeError, ValueError):
         elements = []
     if len(elements) != len(quantities) or not np.isfinite(elements).all():
-        wanted = f"{len(quantities)} finite numbers ({', '.join(map(str, quantities))})"
-        raise InputError(f"{place}, state_vector: expected {wanted}; got {shown(str(vector))}")
+        expected = f"{len(quantities)} finite numbers ({', '.join(map(str, quantities))})"
+        raise InputError(f"{place}, state_vector: expected {expected}; got {shown(str(vector))}")
     rotation = getattr(model, "rotation_offset", None)
     if "bearing" in quantities and rotation is not None:
         place_of = quantities.index("bearing")

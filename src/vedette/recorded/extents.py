@@ -42,8 +42,8 @@ def box_of(places: Floats, share: float = MARGIN) -> Floats:
 
 def is_within(places: Floats, box: Floats) -> Bools:
     """Return True for each place in a box, (num,)."""
-    found: Bools = ((places >= box[0]) & (places <= box[1])).all(axis=1)
-    return found
+    inside: Bools = ((places >= box[0]) & (places <= box[1])).all(axis=1)
+    return inside
 
 
 def beyond_reach(places: Floats, own: Floats, reaches: ArrayLike) -> Bools:
@@ -80,11 +80,11 @@ def _extent(places: Floats) -> Floats:
 
 def _ends(values: Floats) -> Sequence[float]:
     """Return lower and upper end of values."""
-    middle, most, ends = float(np.median(values)), max(len(values) // _MOST_WILD, 1), list[float]()
+    middle, max_outliers, ends = float(np.median(values)), max(len(values) // _MOST_WILD, 1), list[float]()
     for side in (-1.0, 1.0):
         distances = np.sort(side * (values - middle))[::-1]
         i = 0
-        while i < most and distances[i + 2] < _LONELY * distances[i]:
+        while i < max_outliers and distances[i + 2] < _LONELY * distances[i]:
             i += 1
         ends.append(middle + side * float(distances[i]))
     return ends

@@ -43,10 +43,10 @@ class Origin:
     latitude_deg: float
 
     def __post_init__(self) -> None:
-        for name, most in (("longitude_deg", _LONGEST), ("latitude_deg", _HIGHEST)):
+        for name, limit in (("longitude_deg", _LONGEST), ("latitude_deg", _HIGHEST)):
             value = real(f"origin.{name}", getattr(self, name))
-            if abs(value) > most:
-                raise reject(f"origin.{name}", f"degrees from {-most:g} to {most:g}", value)
+            if abs(value) > limit:
+                raise reject(f"origin.{name}", f"degrees from {-limit:g} to {limit:g}", value)
 
     def to_plane(self, longitude_deg: ArrayLike, latitude_deg: ArrayLike) -> Floats:
         """Return metres east and north of the origin, (n, 2): points of the ellipsoid, projected on its tangent plane.

@@ -35,10 +35,10 @@ def merged(
     scans, texts = [list(own) for own in recording.scans], list[str]()
     for s, (site, own) in enumerate(zip(sites, stds, strict=True)):
         if own is None:
-            wanted = (
+            expected = (
                 f"range_dependent, constant or by_axis noise of {shown(site.name)}, whose standard deviations count"
             )
-            raise InputError(f"merge: expected {wanted}; got custom noise")
+            raise InputError(f"merge: expected {expected}; got custom noise")
         before, after, offsets = 0, 0, [np.empty((0, len(own)))]
         for instant in scans:
             if (scan := instant[s]) is None:

@@ -32,22 +32,22 @@ def of_opensky(table: Table) -> tuple[Table, dict[str, str]]:
     Raises:
         InputError: names the file, row, column, and the expected and given values.
     """
-    kept = [i for i in range(len(table.rows)) if all(_is_there(table, name, i) for name in _POSITION)]
-    without = len(table.rows) - len(kept)
-    notes = (f"left out: {pluralise(without, 'row')} without a position",) if without else ()
-    time = "lastposupdate" if _are_there(table, ("lastposupdate",), kept) else "time"
+    rows = [i for i in range(len(table.rows)) if all(_is_there(table, name, i) for name in _POSITION)]
+    num_without = len(table.rows) - len(rows)
+    notes = (f"left out: {pluralise(num_without, 'row')} without a position",) if num_without else ()
+    time = "lastposupdate" if _are_there(table, ("lastposupdate",), rows) else "time"
     first: dict[tuple[str, str], int] = {}
-    for i in kept:
+    for i in rows:
         first.setdefault((str(table.columns["icao24"][i]), str(table.columns[time][i])), i)
-    kept = list(first.values())
-    columns = {name: [cells[i] for i in kept] for name, cells in table.columns.items()}
-    found = replace(table, columns=columns, rows=[table.rows[i] for i in kept], notes=notes)
+    rows = list(first.values())
+    columns = {name: [cells[i] for i in rows] for name, cells in table.columns.items()}
+    reports = replace(table, columns=columns, rows=[table.rows[i] for i in rows], notes=notes)
     names = {"time": time, "id": "icao24", "longitude": "lon", "latitude": "lat"}
-    if not _are_there(table, _VELOCITY, kept):
-        return found, names
-    speed, heading = found.numbers("velocity", FARTHEST), np.radians(found.numbers("heading", 360.0))
+    if not _are_there(table, _VELOCITY, rows):
+        return reports, names
+    speed, heading = reports.numbers("velocity", FARTHEST), np.radians(reports.numbers("heading", 360.0))
     columns |= {"vx": (speed * np.sin(heading)).tolist(), "vy": (speed * np.cos(heading)).tolist()}
-    return found, {**names, "vx": "vx", "vy": "vy"}
+    return reports, {**names, "vx": "vx", "vy": "vy"}
 
 
 def _are_there(table: Table, names: Iterable[str], rows: list[int]) -> bool:

@@ -136,12 +136,12 @@ def usual_names(columns: Iterable[str]) -> dict[str, str]:
     """Return columns under other usual names; places in degrees only if there are none in metres."""
     have = set(columns)
     wanted = ("time", "id") if {"x", "y"} <= have else ("time", "id", "longitude", "latitude")
-    found = {}
+    columns_of = {}
     for quantity in wanted:
         others = [name for name in OTHER_NAMES[quantity] if name in have]
         if quantity not in have and others:
-            found[quantity] = others[0]
-    return found
+            columns_of[quantity] = others[0]
+    return columns_of
 
 
 def _pair(table: Table, names: Sequence[str]) -> Floats:
@@ -153,11 +153,11 @@ def _velocities(
     table: Table, given: Mapping[str, str], names: Sequence[str], origin: tuple[float, float] | None
 ) -> Floats:
     """Return velocities along x and y of the plane, (n, 2) m/s."""
-    found = _pair(table, names)
+    velocities = _pair(table, names)
     if origin is None:
-        return found
+        return velocities
     degrees = (table.numbers(given.get(name, name), np.inf) for name in ("longitude", "latitude"))
-    return np.asarray(np.einsum("nij,nj->ni", Origin(*origin).axes(*degrees), found))
+    return np.asarray(np.einsum("nij,nj->ni", Origin(*origin).axes(*degrees), velocities))
 
 
 def _degrees(table: Table, given: Mapping[str, str]) -> list[Floats]:
@@ -176,8 +176,8 @@ def _to_plane(table: Table, given: Mapping[str, str], origin: Origin, degrees: l
     """Return places in the plane, (num_rows, 2) m."""
     if (beyond := origin.beyond(*degrees)).any():
         at = f"({origin.longitude_deg:g}, {origin.latitude_deg:g}) degrees"
-        wanted = f"a place on the same side of the globe as the origin, {at}"
-        raise table.fault(int(np.argmax(beyond)), given.get("latitude", "latitude"), wanted)
+        expected = f"a place on the same side of the globe as the origin, {at}"
+        raise table.fault(int(np.argmax(beyond)), given.get("latitude", "latitude"), expected)
     return origin.to_plane(*degrees)
 
 
@@ -188,15 +188,15 @@ def _median_longitude(longitudes: Floats) -> float:
     return middle if abs(middle) <= 180.0 else middle - math.copysign(360.0, middle)
 
 
-def _check_agreed(table: Table, found: Floats, origin: Origin) -> None:
+def _check_agreed(table: Table, positions: Floats, origin: Origin) -> None:
     """Check that places in metres agree with the longitudes and latitudes of the same rows."""
-    told = _to_plane(table, {}, origin, _degrees(table, {})) if len(found) else found
-    apart = np.hypot(*(found - told).T)
-    if (wrong := apart > ONE_PLACE + ONE_PLACE_SHARE * np.hypot(*told.T)).any():
+    from_degrees = _to_plane(table, {}, origin, _degrees(table, {})) if len(positions) else positions
+    apart = np.hypot(*(positions - from_degrees).T)
+    if (wrong := apart > ONE_PLACE + ONE_PLACE_SHARE * np.hypot(*from_degrees.T)).any():
         i = int(np.argmax(wrong))
-        where = f"the place of its longitude and latitude ({told[i, 0]:.0f}, {told[i, 1]:.0f} m)"
-        wanted = f"x, y at {where}, not {apart[i]:.0f} m away; `columns: {{x: x, y: y}}` takes them alone"
-        raise table.fault(i, "x", wanted)
+        where = f"the place of its longitude and latitude ({from_degrees[i, 0]:.0f}, {from_degrees[i, 1]:.0f} m)"
+        expected = f"x, y at {where}, not {apart[i]:.0f} m away; `columns: {{x: x, y: y}}` takes them alone"
+        raise table.fault(i, "x", expected)
 
 
 def _positions(
@@ -214,10 +214,10 @@ def _positions(
     if not named_geographic and (has_plane or not has_globe):
         if origin_deg is not None:
             raise InputError("origin_deg: expected only for longitudes and latitudes; the record has x and y")
-        found = _pair(table, [given.get(name, name) for name in ("x", "y")])
+        positions = _pair(table, [given.get(name, name) for name in ("x", "y")])
         if has_globe and usual_origin_deg is not None and "x" not in given:
-            _check_agreed(table, found, Origin(*usual_origin_deg))
-        return found, None, None
+            _check_agreed(table, positions, Origin(*usual_origin_deg))
+        return positions, None, None
     degrees = _degrees(table, given)
     origin_deg = origin_deg or usual_origin_deg
     if origin_deg is None:

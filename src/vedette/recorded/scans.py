@@ -76,11 +76,11 @@ def parse_scans(
         InputError: names the file, row, column, and the expected and given values.
     """
     rows = _Rows(table, sites, conventions, origin)
-    found, skipped = rows.read()
-    if not found:
+    readable, skipped = rows.read()
+    if not readable:
         raise InputError(f"{table.source}: expected at least one row that can be read; got none of {len(table.rows)}")
-    found, beyond = _without_wild(found, table, sites)
-    recording = _at_instants(found, rows, skipped + beyond)
+    readable, beyond = _without_wild(readable, table, sites)
+    recording = _at_instants(readable, rows, skipped + beyond)
     notes = (*table.notes, *rows.without_velocity(recording.poses))
     gathered, file = recording.gathered, ScansFile(Path(table.source).name, table.sha256)
     if any(site.bias != NO_BIAS for site in sites):
@@ -102,15 +102,15 @@ class _Rows(ScanColumns):
 
     def read(self) -> tuple[list[_Row], tuple[str, ...]]:
         """Return the rows that can be read, and the faults of the others."""
-        found, skipped = list[_Row](), list[str]()
+        readable, skipped = list[_Row](), list[str]()
         for i in range(len(self.table.rows)):
             try:
-                found.append(self._row(i))
+                readable.append(self._row(i))
             except InputError as error:
                 if self.conventions.bad_rows == "refuse":
                     raise
                 skipped.append(str(error))
-        return found, tuple(skipped)
+        return readable, tuple(skipped)
 
     def _row(self, i: int) -> _Row:
         s = self._site(i)
@@ -140,8 +140,8 @@ class _Rows(ScanColumns):
                 if abs(time) > LATEST
                 else "a finite number of seconds"
             )
-            wanted = "an ISO 8601 time" if self.is_utc else number
-            raise self.table.fault(i, self._time, wanted)
+            expected = "an ISO 8601 time" if self.is_utc else number
+            raise self.table.fault(i, self._time, expected)
         return time
 
     def _value(self, i: int, quantity: str) -> float:
@@ -152,11 +152,11 @@ class _Rows(ScanColumns):
             value = math.nan
         if not math.isfinite(value):
             raise self.table.fault(i, name, "a finite number")
-        most = MOST.get(quantity, FARTHEST)
-        over = OVER_A_TURN if UNITS[quantity] is ANGLES else 1e-9 * most
-        least = max(-most, QUANTITIES[quantity].least) if quantity in QUANTITIES else -most
-        if not least - (over if least else 0.0) <= value <= most + over:
-            limits = f"from {least / unit:g} to {most / unit:g}"
+        limit = MOST.get(quantity, FARTHEST)
+        over = OVER_A_TURN if UNITS[quantity] is ANGLES else 1e-9 * limit
+        least = max(-limit, QUANTITIES[quantity].least) if quantity in QUANTITIES else -limit
+        if not least - (over if least else 0.0) <= value <= limit + over:
+            limits = f"from {least / unit:g} to {limit / unit:g}"
             raise self.table.fault(i, name, f"a number {limits}")
         return value
 
@@ -253,8 +253,8 @@ class _Rows(ScanColumns):
         assert self.origin is not None  # checked before
         degrees = self._value(i, lon), self._value(i, lat)
         if (place := self.origin.nearby(*degrees)) is None:
-            wanted = f"with latitude {degrees[1]:g} a longitude within {PLANE_REACH / 1000.0:g} km of the origin"
-            raise self.table.fault(i, self._columns[lon][0], f"{wanted} (are they exchanged?)")
+            expected = f"with latitude {degrees[1]:g} a longitude within {PLANE_REACH / 1000.0:g} km of the origin"
+            raise self.table.fault(i, self._columns[lon][0], f"{expected} (are they exchanged?)")
         return place
 
 
@@ -265,21 +265,24 @@ def _without_wild(
     placed = [i for i, row in enumerate(rows) if row.measured is not None and sites[row.sensor].kind in PLACED]
     if not placed:
         return rows, ()
-    some = [rows[i] for i in placed]
-    own = np.array([row.pose[:2] for row in some])
-    measured = [np.array([row.measured]) for row in some]
+    placed_rows = [rows[i] for i in placed]
+    sensor_places = np.array([row.pose[:2] for row in placed_rows])
+    measured = [np.array([row.measured]) for row in placed_rows]
     places = np.concatenate(
-        [places_of(scan, at, sites[row.sensor].kind) for scan, at, row in zip(measured, own, some, strict=True)]
+        [
+            places_of(scan, at, sites[row.sensor].kind)
+            for scan, at, row in zip(measured, sensor_places, placed_rows, strict=True)
+        ]
     )
-    reaches = np.array([sites[row.sensor].reach for row in some])
-    is_wild = wild(np.array([row.time for row in some]), places, own, reaches)
+    reaches = np.array([sites[row.sensor].reach for row in placed_rows])
+    is_wild = wild(np.array([row.time for row in placed_rows]), places, sensor_places, reaches)
     texts, emptied = list[str](), dict[int, _Row]()
     for j in np.flatnonzero(is_wild).tolist():
-        row, away = some[j], float(np.hypot(*(places[j] - own[j])))
+        row, away = placed_rows[j], float(np.hypot(*(places[j] - sensor_places[j])))
         reach = sites[row.sensor].reach
         why = f"within its reach of {reach:g} m" if away > reach else "no farther than the others"
-        wanted = f"a measurement of {shown(sites[row.sensor].name)} {why}"
-        texts.append(f"{table.source}, row {table.rows[row.index]}: expected {wanted}; got one {away:.0f} m away")
+        expected = f"a measurement of {shown(sites[row.sensor].name)} {why}"
+        texts.append(f"{table.source}, row {table.rows[row.index]}: expected {expected}; got one {away:.0f} m away")
         emptied[placed[j]] = replace(row, measured=None)
     return [*emptied.values(), *(row for i, row in enumerate(rows) if i not in emptied)], tuple(texts)
 
@@ -300,8 +303,8 @@ def _at_instants(rows: list[_Row], how: _Rows, skipped: tuple[str, ...]) -> Reco
         for group in groups:
             time = math.fsum(row.time for row in group) / len(group) if window > 0.0 else group[0].time
             looks.append(RecordedScan(time, s, _scan(group, site), np.array(group[-1].pose)))
-    found = group_by_time(looks, poses_at_sites(sites, looks), 0.0, how.is_utc, skipped, how.bearings)
-    return replace(found, gathered=tuple(spans))
+    recording = group_by_time(looks, poses_at_sites(sites, looks), 0.0, how.is_utc, skipped, how.bearings)
+    return replace(recording, gathered=tuple(spans))
 
 
 def _looks_of_turns(

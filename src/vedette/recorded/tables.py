@@ -152,11 +152,11 @@ def are_dates(cells: Sequence[Any]) -> bool:
 
     The majority decides, so that a single bad cell is reported as the bad one.
     """
-    num = sum(map(is_number, cells))
-    if num == 0 or 2 * num > len(cells):
-        return num == 0 and len(cells) > 0
+    num_numbers = sum(map(is_number, cells))
+    if num_numbers == 0 or 2 * num_numbers > len(cells):
+        return num_numbers == 0 and len(cells) > 0
     dates = sum(_is_date(cell) for cell in cells if not is_number(cell))
-    return dates > num or (dates == num and not is_number(cells[0]))
+    return dates > num_numbers or (dates == num_numbers and not is_number(cells[0]))
 
 
 def _is_date(cell: Any) -> bool:
@@ -194,19 +194,19 @@ def read_table(path: str | Path, *, reports: bool = False, sha256: str | None = 
     file = Path(path)
     named = elided(printable(str(file)), 200)
     if file.suffix.lower() in CAPTURE_ENDINGS:
-        how = f"tshark -r {file.name} -T fields -e udp.payload | xxd -r -p > {file.stem}.ast"
-        raise InputError(f"{named}: expected ASTERIX without network headers; got a capture; write it by `{how}`")
+        command = f"tshark -r {file.name} -T fields -e udp.payload | xxd -r -p > {file.stem}.ast"
+        raise InputError(f"{named}: expected ASTERIX without network headers; got a capture; write it by `{command}`")
     if file.suffix.lower() not in ENDINGS:
         raise InputError(f"{named}: expected a file that ends with {', '.join(ENDINGS)}")
     if not os.path.isfile(file):  # pathlib raises for a name that is too long or has forbidden characters
         raise InputError(f"{named}: no such file; expected a table of records")
     if (size := file.stat().st_size) > _MOST_BYTES:
         raise InputError(f"{named}: expected a file of at most {_MOST_BYTES} bytes; got {size}")
-    content, found = _content(file)
-    if sha256 not in (None, found):
-        wanted = f"the file of which sha256 was kept ({sha256[:12]}...)"
-        raise InputError(f"{file}: expected {wanted}; got another ({found[:12]}...), as it was changed since")
-    return replace(_parsed(file, content, reports), sha256=found)
+    content, digest = _content(file)
+    if sha256 not in (None, digest):
+        expected = f"the file of which sha256 was kept ({sha256[:12]}...)"
+        raise InputError(f"{file}: expected {expected}; got another ({digest[:12]}...), as it was changed since")
+    return replace(_parsed(file, content, reports), sha256=digest)
 
 
 def _content(file: Path) -> tuple[bytes, str]:

@@ -39,8 +39,8 @@ class Tracking:
     truth: Truth
 
     def __post_init__(self) -> None:
-        if (came := len(self.tracker.sensors)) != (num := self.recording.poses.shape[1]):
-            raise InputError(f"tracker: expected the {num} sensors of the recording; got {came}")
+        if (num_tracked := len(self.tracker.sensors)) != (num_sensors := self.recording.poses.shape[1]):
+            raise InputError(f"tracker: expected the {num_sensors} sensors of the recording; got {num_tracked}")
         if not np.array_equal(self.truth.times, self.recording.times):
             raise InputError("truth: expected the times of the recording; got others")
 
@@ -59,15 +59,17 @@ class Tracking:
             seed, run: fix the random numbers of filters that draw.
             progress: called with the number of each instant after it.
         """
-        recording, num = self.recording, len(self.tracker.sensors)
-        journal = Journal(self.name, "recorded", seed, run, self.truth, num, recording.file)
+        recording, num_sensors = self.recording, len(self.tracker.sensors)
+        journal = Journal(self.name, "recorded", seed, run, self.truth, num_sensors, recording.file)
 
         def go() -> None:
-            running = RunningTracker(self.tracker, self.estimate, self.truth, sensor_streams(seed, run, FILTER, num))
+            running = RunningTracker(
+                self.tracker, self.estimate, self.truth, sensor_streams(seed, run, FILTER, num_sensors)
+            )
             instants = zip(recording.times.tolist(), recording.scans, recording.poses, strict=True)
             for step, (time, scans, poses) in enumerate(instants, start=1):
                 _, info, estimate = running.step(step, scans, poses, time, journal.begin(step))
-                journal.note(poses, np.zeros(num, np.bool_), info, estimate)
+                journal.note(poses, np.zeros(num_sensors, np.bool_), info, estimate)
                 if progress is not None:
                     progress(step)
 

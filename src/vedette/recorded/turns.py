@@ -65,8 +65,12 @@ def found_turn(times: Floats, bearings: Floats) -> Turn | None:
     at_once = np.flatnonzero(np.diff(times) == 0.0)
     if len(at_once) and np.cos(bearings[at_once + 1] - bearings[at_once]).mean() < _FOUND:
         return None
-    some = np.flatnonzero(times <= times[0] + _SEARCHED_TIME)[:_SEARCHED_ROWS]
-    near, beams, span = times[some] - times[0], np.exp(1j * bearings[some]), float(times[some[-1]] - times[0])
+    first_rows = np.flatnonzero(times <= times[0] + _SEARCHED_TIME)[:_SEARCHED_ROWS]
+    near, beams, span = (
+        times[first_rows] - times[0],
+        np.exp(1j * bearings[first_rows]),
+        float(times[first_rows[-1]] - times[0]),
+    )
     if span < _FEWEST_TURNS * _PERIODS[0]:
         return None
     frequencies = np.arange(max(1.0 / _PERIODS[1], _FEWEST_TURNS / span), 1.0 / _PERIODS[0], 1.0 / (_STEPS * span))
@@ -75,7 +79,7 @@ def found_turn(times: Floats, bearings: Floats) -> Turn | None:
             rate = 2.0 * math.pi * sign * frequency
             if abs((beams * np.exp(-1j * rate * near)).mean()) < _ALIKE:
                 continue
-            rate = _refined(near, bearings[some], rate)
+            rate = _refined(near, bearings[first_rows], rate)
             if abs((beams * np.exp(-1j * rate * near)).mean()) >= _FOUND:
                 return Turn(2.0 * math.pi / abs(rate), clockwise=rate < 0.0)
     return None
@@ -84,9 +88,9 @@ def found_turn(times: Floats, bearings: Floats) -> Turn | None:
 def _refined(times: Floats, bearings: Floats, rate: float) -> float:
     """Return the rate after two linear fits of the residual bearings."""
     for _ in range(2):
-        left = np.exp(1j * (bearings - rate * times))
-        middle = left.mean()
-        rate += float(np.polyfit(times, np.angle(left / middle), 1)[0])
+        residuals = np.exp(1j * (bearings - rate * times))
+        middle = residuals.mean()
+        rate += float(np.polyfit(times, np.angle(residuals / middle), 1)[0])
     return rate
 
 
@@ -146,21 +150,21 @@ def swept(times: Floats, bearings: Floats, poses: Floats, turn: Turn, span: Floa
     """
     beam = _Beam(times, bearings, turn)
     sense, whole = math.copysign(1.0, beam.rate), 2.0 * math.pi
-    seam = _emptiest(bearings)
+    seam_bearing = _emptiest(bearings)
     expected = beam.at(times)
     exact = expected + np.remainder(bearings - expected + math.pi, whole) - math.pi
-    numbers = np.floor(sense * (exact - seam) / whole).astype(np.int64)
-    outer = np.floor(sense * (beam.at(span) - seam) / whole).astype(np.int64)
+    numbers = np.floor(sense * (exact - seam_bearing) / whole).astype(np.int64)
+    outer = np.floor(sense * (beam.at(span) - seam_bearing) / whole).astype(np.int64)
     # Turns without rows count only if the span contains them completely.
     first, last = min(int(numbers.min()), int(outer[0]) + 1), max(int(numbers.max()), int(outer[1]) - 1)
-    found = []
+    scans = []
     for number in range(first, last + 1):
-        edges = [seam + sense * whole * (number + part) for part in (0.0, 0.5, 1.0)]
+        edges = [seam_bearing + sense * whole * (number + part) for part in (0.0, 0.5, 1.0)]
         begin, middle, end = map(beam.when, edges)
         pose = _moving(times, poses, middle, end - begin)
         beamed = with_beam(pose.place, pose.velocity, math.remainder(edges[1], whole), sense * whole / (end - begin))
-        found.append(Swept(middle, np.flatnonzero(numbers == number), beamed))
-    return found
+        scans.append(Swept(middle, np.flatnonzero(numbers == number), beamed))
+    return scans
 
 
 def _emptiest(bearings: Floats) -> float:
