@@ -105,7 +105,7 @@ REFUSED: list[Case] = [
     *each("Pointing", "turn_rate_deg", 0.0, words="a number above 0"),
     (
         "MountedPlatform",
-        {"carrier": GOOD["MountedPlatform"].arguments["pointing"]},
+        {"platform": GOOD["MountedPlatform"].arguments["pointing"]},
         "pointing: expected columns other than",
     ),
     *each("Sequences", "platform", None, words="a platform"),
@@ -140,7 +140,7 @@ REFUSED: list[Case] = [
     *each("HorizonPlanner", "budget", 0),
     *each("HorizonPlanner", "discount", 1.5),
     *each("HorizonPlanner", "period", -1.0),
-    *each("MountedPlatform", "carrier", 5, words="a platform"),
+    *each("MountedPlatform", "platform", 5, words="a platform"),
     *each("PlanningSettings", "horizon_steps", 0, words="a whole number of at least 1; got 0"),
     *each("PlanningSettings", "horizon_steps", 2.5, words="a whole number"),
     *each("PlanningSettings", "num_samples", 0, "40", words="a whole number"),

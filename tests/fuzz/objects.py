@@ -69,7 +69,7 @@ def _models() -> Iterator[tuple[str, Made]]:
         (models.around_sensor, {"rate": 2.0, "kind": "position", "radius": 9.0, "half_width_rad": 3.0}),
         (models.MeasurementBirth, {"expected": 0.5, "max_existence": 0.1, "std": [1.0] * 4}),
         (models.BirthModel, {"existence": [0.1], "means": [STATE], "covs": [np.eye(4)], "steps": frozenset([1])}),
-        (models.CellGrid.covering, {"region": region, "cell": 20.0}),
+        (models.CellGrid.covering, {"region": region, "cell_size": 20.0}),
         (models.CellGrid, {"region": region, "columns": 3, "rows": 3}),
         (platforms.HeadingPlatform, {"speed": 5.0, "headings_deg": [0.0, 90.0], "relative": False}),
         (platforms.GridPlatform, {"length": 5.0, "speed": 5.0, "directions_deg": [0.0, 90.0], "allow_staying": True}),
@@ -78,7 +78,7 @@ def _models() -> Iterator[tuple[str, Made]]:
             platforms.Pointing,
             {"pointings_deg": [0.0], "relative": False, "half_widths_deg": [9.0], "turn_rate_deg": 3.0},
         ),
-        (platforms.MountedPlatform, {"carrier": platforms.Stationary(), "pointing": platforms.Pointing([0.0])}),
+        (platforms.MountedPlatform, {"platform": platforms.Stationary(), "pointing": platforms.Pointing([0.0])}),
         (platforms.Sequences, {"platform": platforms.HeadingPlatform(5.0), "depth": 2, "period": 1.0}),
         (platforms.Actions, {"columns": ("heading_deg",), "values": np.zeros((1, 1))}),
         (

@@ -144,10 +144,10 @@ def test_means_over_a_cell_are_exact_for_polynomials() -> None:
 
 
 @pytest.mark.parametrize(
-    ("cell", "columns", "rows"), [(40.0, 6, 2), (39.9, 7, 3), (1e6, 1, 1), (0.1, 2400, 800), (80.0 / 3.0, 9, 3)]
+    ("cell_size", "columns", "rows"), [(40.0, 6, 2), (39.9, 7, 3), (1e6, 1, 1), (0.1, 2400, 800), (80.0 / 3.0, 9, 3)]
 )
-def test_a_grid_of_cells_up_to_a_size(cell: float, columns: int, rows: int) -> None:
-    grid = CellGrid.covering(REGION, cell)
+def test_a_grid_of_cells_up_to_a_size(cell_size: float, columns: int, rows: int) -> None:
+    grid = CellGrid.covering(REGION, cell_size)
     assert (grid.columns, grid.rows) == (columns, rows)
 
 
@@ -155,7 +155,7 @@ BAD: list[tuple[Any, str]] = [
     (lambda: CellGrid(REGION, 0, 4), "CellGrid.columns: expected a whole number of at least 1; got 0"),
     (lambda: CellGrid(REGION, 3, HALF), "CellGrid.rows: expected a whole number of at least 1; got 2.5"),
     (lambda: CellGrid(ANY, 3, 2), "CellGrid.region: expected a Region; got box"),
-    (lambda: CellGrid.covering(REGION, 0.0), "cell: expected a number above 0; got 0"),
+    (lambda: CellGrid.covering(REGION, 0.0), "cell_size: expected a number above 0; got 0"),
     (lambda: GRID.states(1), "state_dim: expected at least 2, px and py first; got 1"),
     (lambda: GRID.states(4, 0), "nodes_a_side: expected a whole number of at least 1; got 0"),
     (lambda: UndetectedModel(ANY, 1.0), "UndetectedModel.grid: expected a CellGrid; got box"),

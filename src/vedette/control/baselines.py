@@ -62,9 +62,11 @@ class RandomPlanner:
 
     def __post_init__(self) -> None:
         check_control_inputs(self)
-        asking = [own.name for own in self.constraints if own.needs_beliefs]
-        if asking and not all(has_labels(sensor.filter) for sensor in self.sensors):
-            raise reject("constraints", "none that asks where targets will be, as filters have no labels", asking[0])
+        needing_beliefs = [own.name for own in self.constraints if own.needs_beliefs]
+        if needing_beliefs and not all(has_labels(sensor.filter) for sensor in self.sensors):
+            raise reject(
+                "constraints", "none that asks where targets will be, as filters have no labels", needing_beliefs[0]
+            )
 
     def plan(self, state: State, poses: Floats, *, rng: np.random.Generator) -> Plan:
         """Return a plan drawn from `rng`; beliefs are used only by constraints."""
@@ -144,11 +146,11 @@ class ConstraintReportingPlanner:
         plan, settings = self.planner.plan(state, poses, rng=rng), self.settings
         at, times = check_poses(poses, len(self.sensors)), settings.horizon_times()
         rows = zip(self.sensors, at, plan.chosen_actions, strict=True)
-        ways = [
+        arguments = [
             (f"sensors[{s}].platform", own.platform, pose, row[np.newaxis], times)
             for s, (own, pose, row) in enumerate(rows)
         ]
-        courses, scans = tuple(courses_of(*way) for way in ways), tuple(scans_of(*way) for way in ways)
+        courses, scans = tuple(courses_of(*way) for way in arguments), tuple(scans_of(*way) for way in arguments)
         fused = getattr(state, "fused", None)
         beliefs = predicted_beliefs(self.constraints, self.sensors, fused, settings, 1, settings.horizon_steps)
         notes = violation_notes(self.constraints, ConstraintContext(courses, times, beliefs, at, scans))

@@ -89,8 +89,11 @@ class BeyondHorizon:
         views = map(views_per_second, self.options, turns.tolist())
         rate = max(float((speeds / self.reaches).max()), *views)
         total = min(horizon + beyond, max(_MOST_STEPS / rate if rate > 0.0 else math.inf, 2.0 * horizon))
-        num = min(max(_LEAST_STEPS, math.ceil(total * rate)), _MOST_STEPS)
-        return tuple(replace(settings, horizon_steps=steps, horizon_period=total / num) for steps in (num // 2, num))
+        num_steps = min(max(_LEAST_STEPS, math.ceil(total * rate)), _MOST_STEPS)
+        return tuple(
+            replace(settings, horizon_steps=steps, horizon_period=total / num_steps)
+            for steps in (num_steps // 2, num_steps)
+        )
 
     def extrapolated(self, horizon: Floats, times: Floats) -> tuple[Options, ...]:
         """Return the options with courses at `times` (num_times,) s, around forbidden zones. See `extrapolated`."""
@@ -104,7 +107,9 @@ class BeyondHorizon:
         if self.paths is None:
             return ()
         moves = [bool((own.courses[:, :, :2] != own.pose[:2]).any()) for own in self.options]
-        visible = np.stack([self._in_sight(s) | (self._is_attainable(s) & can) for s, can in enumerate(moves)])
+        visible = np.stack(
+            [self._in_sight(s) | (self._is_attainable(s) & can_move) for s, can_move in enumerate(moves)]
+        )
         return tuple(
             f"target {tuple(label)}: no path that the constraints allow brings a sensor within sight of it"
             for label in self.labels[~visible.any(axis=0)].tolist()
@@ -209,14 +214,16 @@ class BeyondHorizon:
         if not counts.any():
             return np.full(len(ends), -1), lengths
         progress = np.where(counts, now - np.where(counts, then, 0.0), -np.inf)
-        best, most = progress.argmax(axis=0), progress.max(axis=0)
+        best_courses, max_progress = progress.argmax(axis=0), progress.max(axis=0)
         longest = lengths.max()
         with np.errstate(invalid="ignore"):
-            share = np.where(most > _LEAST_PROGRESS, progress / most, 1.0 + (progress - most) / longest)
+            share = np.where(
+                max_progress > _LEAST_PROGRESS, progress / max_progress, 1.0 + (progress - max_progress) / longest
+            )
         share = np.where(counts, np.maximum(share, 0.0), 0.0)
         largest = share.max(axis=1, keepdims=True)
         goals = np.where((share >= largest - _SAME_PROGRESS) & (share > 0.0), then, np.inf).argmin(axis=1)
-        return np.where(largest[:, 0] > 0.0, goals, -1), largest[:, 0] * lengths[best[goals]]
+        return np.where(largest[:, 0] > 0.0, goals, -1), largest[:, 0] * lengths[best_courses[goals]]
 
 
 def attracting_targets(prediction: LMB) -> tuple[Ints, Floats]:

@@ -90,8 +90,8 @@ def is_blind_while_turning(own: Options) -> bool:
 def _stops(own: Options, step: float, times: Floats) -> tuple[Floats, Bools]:
     """Return the result of `turned_on` for a camera that is blind while it turns; step: s, time that it stays."""
     column, first = own.actions.columns.index(POINTS), own.pose[POINTING]
-    wanted = np.radians([own.actions.values[own.first_action(course), column] for course in range(len(own.courses))])
-    turns = wrap_angles(wanted - first)[:, np.newaxis]
+    pointings = np.radians([own.actions.values[own.first_action(course), column] for course in range(len(own.courses))])
+    turns = wrap_angles(pointings - first)[:, np.newaxis]
     rate = np.abs(wrap_angles(own.courses[:, 0, POINTING] - first)).max() / step
     if rate == 0.0:
         return np.repeat(wrap_angles(first + turns), len(times), axis=1), np.ones((len(turns), len(times)), np.bool_)

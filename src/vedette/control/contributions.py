@@ -27,26 +27,26 @@ class Contributions(NamedTuple):
     samples: Floats  # (num_samples,) rewards of the choice
 
 
-def contributions_of(additive: AdditiveRewards, chosen: Ints, which: Ints) -> Contributions:
+def contributions_of(additive: AdditiveRewards, chosen: Ints, sensors: Ints) -> Contributions:
     """Return the contributions of some sensors to the reward of courses (num_sensors,); the others always scan.
 
     A sensor's contribution is its Shapley value on two orders, the printed and the reverse one: rewards of the first
-    sensors, of the last ones, and of all but one, while the rest of them do not scan. which: (num,) indices of these
-    sensors.
+    sensors, of the last ones, and of all but one, while the rest of them do not scan. sensors: (num,) indices of
+    these sensors.
     """
-    num = len(which)
-    begun = np.arange(num) < np.arange(num + 1)[:, np.newaxis]
-    scanning = np.concatenate([begun, ~begun, ~np.eye(num, dtype=bool)])
+    num_sensors = len(sensors)
+    first_scan = np.arange(num_sensors) < np.arange(num_sensors + 1)[:, np.newaxis]
+    scanning = np.concatenate([first_scan, ~first_scan, ~np.eye(num_sensors, dtype=bool)])
     actions = np.tile(chosen, (len(scanning), 1))
-    actions[:, which] = np.where(scanning, chosen[which], -1)
+    actions[:, sensors] = np.where(scanning, chosen[sensors], -1)
     rewards = additive(actions)
     means = rewards.mean(axis=1)
-    ahead, behind, without = np.split(means, [num + 1, 2 * num + 2])
+    ahead, behind, without = np.split(means, [num_sensors + 1, 2 * num_sensors + 2])
     existence, localisation = _of_labels(additive, chosen, actions[0])
     total_gain = additive.found(chosen) - additive.found(actions[0])
     shares = 0.5 * (np.diff(ahead) - np.diff(behind))
     return Contributions(
-        float(means[0]), existence, localisation, total_gain, shares, ahead[num] - without, rewards[num]
+        float(means[0]), existence, localisation, total_gain, shares, ahead[num_sensors] - without, rewards[num_sensors]
     )
 
 
@@ -56,14 +56,14 @@ def _of_labels(additive: AdditiveRewards, chosen: Ints, rest: Ints) -> tuple[Flo
     The gain by existence is that of the existence after all scans with the density after the scans of `rest`, in which
     -1 is a sensor that does not scan; the remainder is localisation.
     """
-    valuation, coefficients, unseen = additive.valuation, additive.coefficients, additive.with_scans(rest)
+    valuation, coefficients, without_scans = additive.valuation, additive.coefficients, additive.with_scans(rest)
     if coefficients is None:
         return None, None
-    seen, dim = additive.with_scans(chosen), valuation.references.shape[1]
-    known = unseen.copy()
-    known[:, -2] += existence_logits(seen, dim) - existence_logits(unseen, dim)
+    with_scans, dim = additive.with_scans(chosen), valuation.references.shape[1]
+    with_existence = without_scans.copy()
+    with_existence[:, -2] += existence_logits(with_scans, dim) - existence_logits(without_scans, dim)
     before, partly, whole = (
         (label_values(rows, valuation).mean(axis=2) @ coefficients).reshape(additive.num_horizons, -1).sum(axis=0)
-        for rows in (unseen, known, seen)
+        for rows in (without_scans, with_existence, with_scans)
     )
     return partly - before, whole - partly

@@ -176,8 +176,8 @@ class DecisionAnalysis:
         wanted = [columns.get(name, value) for name, value in zip(own.columns, own.values[chosen], strict=True)]
         fits = np.flatnonzero(_same(own, np.array(wanted, np.float64)))
         if len(fits) == 0:
-            asked = ", ".join(f"{name} {value:g}" for name, value in columns.items())
-            raise InputError(f"had: expected something that sensor {sensor + 1} could do ({_few(own)}); got {asked}")
+            request = ", ".join(f"{name} {value:g}" for name, value in columns.items())
+            raise InputError(f"had: expected something that sensor {sensor + 1} could do ({_few(own)}); got {request}")
         return int(fits[0])
 
 

@@ -90,38 +90,38 @@ class Rounds:
     def _run(self, races: Sequence[Race]) -> Literal["max_samples", "max_seconds"] | None:
         """Run rounds, at least one, until all races are over; return the reason if they were stopped before."""
         settings = self.preparation.settings
-        most = settings.max_samples - self.num_samples + races[0].num_samples
-        while going := [race for race in races if race.verdict is None or race.num_samples == 0]:
-            num = going[0].num_samples
-            if num >= most:
+        max_samples = settings.max_samples - self.num_samples + races[0].num_samples
+        while open_races := [race for race in races if race.verdict is None or race.num_samples == 0]:
+            num_samples = open_races[0].num_samples
+            if num_samples >= max_samples:
                 return "max_samples"
-            if num > 0 and self.deadline():
+            if num_samples > 0 and self.deadline():
                 return "max_seconds"
-            self._run_one(going, next_total(num, most) - num)
+            self._run_one(open_races, next_total(num_samples, max_samples) - num_samples)
         return None
 
-    def _run_one(self, going: Sequence[Race], num: int) -> None:
-        """Run one round of `num` samples."""
-        sizes = [min(_BLOCK, num - first) for first in range(0, num, _BLOCK)]
-        blocks = [self._rewards(going, size) for size in sizes]
-        for place, race in enumerate(going):
+    def _run_one(self, open_races: Sequence[Race], num_samples: int) -> None:
+        """Run one round of `num_samples` samples."""
+        sizes = [min(_BLOCK, num_samples - first) for first in range(0, num_samples, _BLOCK)]
+        blocks = [self._rewards(open_races, size) for size in sizes]
+        for place, race in enumerate(open_races):
             race.add(np.concatenate([block[place] for block in blocks], axis=1))
-        self.num_samples += num
+        self.num_samples += num_samples
 
-    def _rewards(self, going: Sequence[Race], num: int) -> list[Floats]:
-        """Return for each race rewards (num_left, num) of its remaining courses on newly drawn samples."""
+    def _rewards(self, open_races: Sequence[Race], num_samples: int) -> list[Floats]:
+        """Return for each race rewards (num_left, num_samples) of its remaining courses on newly drawn samples."""
         options = self.preparation.options
-        wanted = [_wanted(going, s) for s in range(len(options))]
+        courses_of = [_wanted(open_races, s) for s in range(len(options))]
         others = None
         if self.others is not None:
-            wanted = [np.union1d(own, [other]) for own, other in zip(wanted, self.others, strict=True)]
-            others = [int(np.searchsorted(own, other)) for own, other in zip(wanted, self.others, strict=True)]
-        few = tuple(_only(own, courses) for own, courses in zip(options, wanted, strict=True))
-        evaluator = self.preparation.evaluator(num, few, rng=self.rng)
+            courses_of = [np.union1d(own, [other]) for own, other in zip(courses_of, self.others, strict=True)]
+            others = [int(np.searchsorted(own, other)) for own, other in zip(courses_of, self.others, strict=True)]
+        few = tuple(_only(own, courses) for own, courses in zip(options, courses_of, strict=True))
+        evaluator = self.preparation.evaluator(num_samples, few, rng=self.rng)
         rewards = []
-        for race in going:
+        for race in open_races:
             evaluate = evaluator.joint() if race.sensor is None else evaluator.alone(race.sensor, others)
-            those = wanted if race.sensor is None else [wanted[race.sensor]]
+            those = courses_of if race.sensor is None else [courses_of[race.sensor]]
             columns = [np.searchsorted(own, race.candidates[:, axis]) for axis, own in enumerate(those)]
             rewards.append(evaluate(np.stack(columns, axis=1)))
         for name, count in evaluator.counts.items():
@@ -136,8 +136,8 @@ class Rounds:
         if all(race.verdict == "one left" for race in races):
             over = "one left"
         confidence = max(0.0, 1.0 - sum(1.0 - race.reached for race in races))
-        left, started = tuple(len(race.left) for race in races), tuple(len(race.actions) for race in races)
-        return SamplingOutcome(stopped or over, confidence, self.num_samples, left, started)
+        num_left, num_started = tuple(len(race.left) for race in races), tuple(len(race.actions) for race in races)
+        return SamplingOutcome(stopped or over, confidence, self.num_samples, num_left, num_started)
 
 
 def decide_jointly(
@@ -221,8 +221,8 @@ def _active(parts: Sequence[Part], mask: Mask | None) -> Sequence[Part]:
     for part, course, off in zip(parts, joint, mask.active.off, strict=True):
         scanning, silent = part.evidence.evaluate(np.array([[course], [off[course]]])).tolist()
         gains.append(scanning - silent)
-    kept = mask.active.kept(joint, gains)
-    return [part._replace(chosen=(course,)) for part, course in zip(parts, kept, strict=True)]
+    courses = mask.active.within_limit(joint, gains)
+    return [part._replace(chosen=(course,)) for part, course in zip(parts, courses, strict=True)]
 
 
 def _raced_plan(
@@ -262,17 +262,17 @@ def combine_parts(
     )
 
 
-def _wanted(going: Sequence[Race], sensor: int) -> Ints:
+def _wanted(open_races: Sequence[Race], sensor: int) -> Ints:
     """Return the courses of a sensor that some candidate takes; one course, if no race needs any."""
-    wanted = [race for race in going if race.sensor in (None, sensor)]
-    columns = [race.candidates[:, sensor if race.sensor is None else 0] for race in wanted]
+    races = [race for race in open_races if race.sensor in (None, sensor)]
+    columns = [race.candidates[:, sensor if race.sensor is None else 0] for race in races]
     return np.unique(np.concatenate(columns)) if columns else np.zeros(1, np.int64)
 
 
 def _only(own: Options, courses: Ints) -> Options:
     """Return the options restricted to some courses, which are renumbered."""
-    kept = np.isin(own.which, courses)
-    actions = Actions(own.actions.columns, own.actions.values[kept])
-    which, chosen = np.searchsorted(courses, own.which[kept]), np.ascontiguousarray(own.courses[courses])
+    in_courses = np.isin(own.which, courses)
+    actions = Actions(own.actions.columns, own.actions.values[in_courses])
+    which, chosen = np.searchsorted(courses, own.which[in_courses]), np.ascontiguousarray(own.courses[courses])
     prices, scans = own.prices[courses], own.scans[courses]
     return own._replace(actions=actions, courses=chosen, which=which, prices=prices, scans=scans)

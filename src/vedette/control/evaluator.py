@@ -140,9 +140,9 @@ class Evaluator:
             return rewards
 
         def evaluate(actions: Ints) -> Floats:
-            found = rewards(actions)
-            self.counts["rewards"] += found.size
-            return found
+            values = rewards(actions)
+            self.counts["rewards"] += values.size
+            return values
 
         return evaluate
 

@@ -118,10 +118,10 @@ class Evidence:
     def is_complete(self) -> bool:
         """Return True if every joint action was evaluated."""
         if not self._is_complete:
-            num, noted = math.prod(self.shape), [noted[0] for noted in self._noted]
-            if sum(map(len, noted)) >= num:
-                places = np.ravel_multi_index(tuple(np.concatenate(noted).T), self.shape)
-                self._is_complete = bool(np.bincount(places, minlength=num).all())
+            num_joint, evaluated = math.prod(self.shape), [entry[0] for entry in self._noted]
+            if sum(map(len, evaluated)) >= num_joint:
+                places = np.ravel_multi_index(tuple(np.concatenate(evaluated).T), self.shape)
+                self._is_complete = bool(np.bincount(places, minlength=num_joint).all())
         return self._is_complete
 
     def mean_of(self, choice: Sequence[int]) -> float:
@@ -152,8 +152,8 @@ class Evidence:
 
         They are in printed order, without joint actions that have no finite mean, except the choice.
         """
-        noted, means, _ = self._all()
-        actions, places = np.unique(noted, axis=0, return_index=True)
+        evaluated, means, _ = self._all()
+        actions, places = np.unique(evaluated, axis=0, return_index=True)
         means = means[places]
         own = (actions == np.array(choice)).all(axis=1)
         order = np.lexsort((~own, np.where(np.isnan(means), math.inf, -means)))
@@ -174,8 +174,8 @@ class Evidence:
 
     def holds(self, choice: Sequence[int]) -> bool:
         """Return True if this joint action has been evaluated."""
-        noted = [actions for actions, _, _ in self._noted]
-        return bool(noted) and bool((np.concatenate(noted) == np.array(choice)).all(axis=1).any())
+        evaluated = [actions for actions, _, _ in self._noted]
+        return bool(evaluated) and bool((np.concatenate(evaluated) == np.array(choice)).all(axis=1).any())
 
     def tables(self, choice: Sequence[int]) -> tuple[RewardTable, ...]:
         """Return one table of all evaluated rewards, with gaps elsewhere.
@@ -196,12 +196,12 @@ class Evidence:
 
     def _table(self, sensors: tuple[int, ...], actions: Ints, means: Floats, errors: Floats) -> RewardTable:
         """Return rewards of joint actions (num, num of `sensors`), as course indices, as a table over the actions."""
-        which, shape, filled = [], [], []
+        columns_of, shape, filled = [], [], []
         for s in sensors:
             own = self.evaluator.options[s]
-            which.append(own.which)
+            columns_of.append(own.which)
             shape.append(len(own.courses))
-        spread = np.ix_(*which)
+        spread = np.ix_(*columns_of)
         # The first evaluation is used: a later one, along a line, may differ from it in the last digit.
         places, first = np.unique(np.ravel_multi_index(tuple(actions.T), shape), return_index=True)
         for values in (means, errors):
@@ -235,8 +235,8 @@ class Part(NamedTuple):
         """Return the contributions to its reward; None if rewards are not sums over labels."""
         if self.additive is None:
             return None
-        joint, which = np.array(self.chosen), np.arange(len(self.chosen))
+        joint, sensors = np.array(self.chosen), np.arange(len(self.chosen))
         if self.others is not None:
-            joint, which = np.array(self.others), np.array(self.evidence.which)
-            joint[which] = self.chosen
-        return contributions_of(self.additive, joint, which)
+            joint, sensors = np.array(self.others), np.array(self.evidence.which)
+            joint[sensors] = self.chosen
+        return contributions_of(self.additive, joint, sensors)

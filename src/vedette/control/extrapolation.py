@@ -20,15 +20,15 @@ def extrapolated(own: Options, horizon: Floats, times: Floats) -> Options:
     pose stay, and it scans, even if its action kept it from scanning before.
     """
     start = np.broadcast_to(own.pose, (len(own.courses), 1, len(own.pose)))
-    known = np.concatenate([start, own.courses], axis=1)
+    poses = np.concatenate([start, own.courses], axis=1)
     ends = np.concatenate([[0.0], horizon])
     rounds = np.maximum(np.ceil(times / ends[-1] - 1e-9) - 1.0, 0.0)
     within = times - rounds * ends[-1]
     after = np.searchsorted(ends, within - 1e-9).clip(1, len(horizon))
     share = ((within - ends[after - 1]) / (ends[after] - ends[after - 1]))[:, np.newaxis]
-    courses = np.where(rounds[:, np.newaxis] > 0.0, known[:, -1:], known[:, after])
-    moved = known[:, -1:, :2] - known[:, :1, :2]
-    straight = known[:, after - 1, :2] * (1.0 - share) + known[:, after, :2] * share
+    courses = np.where(rounds[:, np.newaxis] > 0.0, poses[:, -1:], poses[:, after])
+    moved = poses[:, -1:, :2] - poses[:, :1, :2]
+    straight = poses[:, after - 1, :2] * (1.0 - share) + poses[:, after, :2] * share
     courses[:, :, :2] = straight + rounds[:, np.newaxis] * moved
     later = rounds > 0.0
     scans = later | own.scans[:, after - 1]

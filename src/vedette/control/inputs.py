@@ -151,11 +151,11 @@ def predicted_beliefs(
 
     Raises `InputError` for a belief without labels.
     """
-    asking = [constraint.name for constraint in constraints if constraint.needs_beliefs]
-    if fused is None or not asking:
+    needing_beliefs = [constraint.name for constraint in constraints if constraint.needs_beliefs]
+    if fused is None or not needing_beliefs:
         return ()
     if not isinstance(fused, LabelledDensity):
-        expected = f"a density with labels, as the constraint {asking[0]} asks where targets will be"
+        expected = f"a density with labels, as the constraint {needing_beliefs[0]} asks where targets will be"
         raise reject("state.fused", expected, type(fused).__name__)
     motion = common_target_model([sensor.filter for sensor in sensors]).motion
     return tuple(predicted(fused, motion, step, settings.horizon_period) for step in range(first, last + 1))
@@ -184,12 +184,12 @@ def stationary_courses(options: Sequence[Options], mask: Mask | None) -> tuple[i
         angles = [2, POINTING] if camera else [2]
         off[:, :, angles] = np.abs(np.remainder(off[:, :, angles] + np.pi, 2.0 * np.pi) - np.pi)
         rest = np.delete(off[:, :, :LEFT], [0, 1, *angles], axis=2).sum(axis=2)
-        left = np.flatnonzero(single_mask(mask, s, len(off)))
-        left = left if len(left) else np.arange(len(off))
+        candidates = np.flatnonzero(single_mask(mask, s, len(off)))
+        candidates = candidates if len(candidates) else np.arange(len(off))
         for change in (*(off[:, :, angle] for angle in angles), np.hypot(off[:, :, 0], off[:, :, 1]), rest):
-            means = change.mean(axis=1)[left]
-            left = left[means <= means.min() + _SAME_CHANGE * max(1.0, means.max())]
-        stationary.append(int(left[0]))
+            means = change.mean(axis=1)[candidates]
+            candidates = candidates[means <= means.min() + _SAME_CHANGE * max(1.0, means.max())]
+        stationary.append(int(candidates[0]))
     return tuple(stationary) if mask is None or mask.active is None else _silent(stationary, mask.active)
 
 
@@ -200,19 +200,19 @@ def _silent(joint: Sequence[int], active: Active) -> tuple[int, ...]:
 
 def compiled_mask(mask: Mask | None, shape: Sequence[int]) -> Allowed | None:
     """Return the mask in the form of the compiled ascent; None if it would be too large."""
-    none, num = np.ones((0, 0), np.bool_), sum(shape)
-    on, most = np.zeros(num, np.bool_), len(shape)
+    none, num_courses = np.ones((0, 0), np.bool_), sum(shape)
+    on, max_active = np.zeros(num_courses, np.bool_), len(shape)
     if mask is None:
-        return Allowed(np.ones(num, np.bool_), none, on, most)
+        return Allowed(np.ones(num_courses, np.bool_), none, on, max_active)
     single = np.concatenate(mask.single)
     if mask.active is not None:
-        on, most = np.concatenate(mask.active.on), mask.active.most
+        on, max_active = np.concatenate(mask.active.on), mask.active.limit
     if not mask.together:
-        return Allowed(single, none, on, most)
-    if num > _MOST_COURSES:
+        return Allowed(single, none, on, max_active)
+    if num_courses > _MOST_COURSES:
         return None
-    together, firsts = np.ones((num, num), np.bool_), np.concatenate([[0], np.cumsum(shape)])
+    together, firsts = np.ones((num_courses, num_courses), np.bool_), np.concatenate([[0], np.cumsum(shape)])
     for (i, j), table in mask.together.items():
         rows, columns = slice(firsts[i], firsts[i + 1]), slice(firsts[j], firsts[j + 1])
         together[rows, columns], together[columns, rows] = table, table.T
-    return Allowed(single, together, on, most)
+    return Allowed(single, together, on, max_active)

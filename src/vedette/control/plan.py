@@ -72,8 +72,10 @@ class SamplingOutcome(NamedTuple):
         if self.reason == "no samples":
             return "certain: the reward needs no samples"
         level = f"{100.0 * self.confidence:.3g} %"
-        left = f"{' + '.join(map(str, self.candidates))} of {' + '.join(map(str, self.started))} candidates left"
-        spent = f"after {self.samples} samples, {left}"
+        candidates_left = (
+            f"{' + '.join(map(str, self.candidates))} of {' + '.join(map(str, self.started))} candidates left"
+        )
+        spent = f"after {self.samples} samples, {candidates_left}"
         if self.certain:
             return f"certain at {level} {spent}"
         ended = {"max_samples": "samples ran out", "max_seconds": "time ran out"}[self.reason]
@@ -148,10 +150,10 @@ class Plan(TabularRepr):
 
     def without_evidence(self, *, explained: bool) -> Plan:
         """Return the plan for storage, without its evidence, which takes memory; `explained`: with its explanation."""
-        kept = self.explanation
+        explanation = self.explanation
         if explained and self.analysis is not None:
-            kept = self.analysis().without_evidence()
-        return replace(self, explanation=kept, analysis=None)
+            explanation = self.analysis().without_evidence()
+        return replace(self, explanation=explanation, analysis=None)
 
     @property
     def num_sensors(self) -> int:

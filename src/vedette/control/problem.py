@@ -98,8 +98,8 @@ def note_lines(evidence: Evidence, choice: Sequence[int], mask: Mask | None) -> 
 def _note_line(evidence: Evidence, mask: Mask | None, through: Sequence[int], sensor: int, rewards: Floats) -> None:
     actions = np.tile(np.array(through, np.int64), (evidence.shape[sensor], 1))
     actions[:, sensor] = np.arange(evidence.shape[sensor])
-    kept = slice(None) if mask is None else mask.allows(actions)
-    evidence.note(actions[kept], rewards[kept])
+    is_allowed = slice(None) if mask is None else mask.allows(actions)
+    evidence.note(actions[is_allowed], rewards[is_allowed])
 
 
 def _independent(evidence: Evidence, mask: Mask | None) -> tuple[int, ...]:
@@ -115,7 +115,7 @@ def _independent(evidence: Evidence, mask: Mask | None) -> tuple[int, ...]:
     if mask is None or mask.active is None:
         return tuple(best)
     gains = [own[course] - own[off[course]] for own, course, off in zip(means, best, mask.active.off, strict=True)]
-    return mask.active.kept(best, gains)
+    return mask.active.within_limit(best, gains)
 
 
 # Fraction of the likely detected targets that are beyond the cutoff, above which a note is given. On paper-a up to half
@@ -145,14 +145,14 @@ def upper_bound_by_target(evidence: Evidence) -> tuple[float, int] | None:
 
     No joint action has a larger mean reward. None for rewards that are not linear in sums over targets.
     """
-    evaluator, known = evidence.evaluator, evidence.upper_bound_by_target
+    evaluator, cached = evidence.evaluator, evidence.upper_bound_by_target
     additive = evaluator.additive
-    if not known and additive is not None and additive.coefficients is not None:
+    if not cached and additive is not None and additive.coefficients is not None:
         best = label_upper_bounds(additive, evaluator.settings.max_bound_work)
         unknown = np.isinf(best).reshape(additive.num_horizons, -1).any(axis=0)
         cheapest = np.minimum.reduceat(additive.prices, additive.table.first_courses[:-1]).sum()
-        known.append((float(best.sum()) + _most_found(additive) - float(cheapest), int(unknown.sum())))
-    return known[0] if known else None
+        cached.append((float(best.sum()) + _most_found(additive) - float(cheapest), int(unknown.sum())))
+    return cached[0] if cached else None
 
 
 def label_upper_bounds(additive: AdditiveRewards, max_work: int) -> Floats:
@@ -165,8 +165,8 @@ def label_upper_bounds(additive: AdditiveRewards, max_work: int) -> Floats:
     if len(table.start) == 0:
         return np.empty(0)
     choices = choices_of(table)
-    ways = _ways(choices, len(table.start))
-    best = np.where(ways * additive.num_samples <= max_work, 0.0, math.nan)
+    num_choices = _ways(choices, len(table.start))
+    best = np.where(num_choices * additive.num_samples <= max_work, 0.0, math.nan)
 
     def work(first: int, last: int) -> None:
         best_of_labels(table, additive.valuation, coefficients, choices, first, last, best)
@@ -193,10 +193,10 @@ def choices_of(table: Table) -> Choices:
     # Courses of the sensor that do not reach the label are one additional choice.
     spare = (counts < sizes[distinct % len(sizes)]).astype(np.int64)
     offsets = offsets_of(counts + spare)
-    found = np.full(offsets[-1], -1)
-    found[np.arange(len(order)) + np.repeat(offsets[:-1] - starts, counts)] = order
+    choice_entries = np.full(offsets[-1], -1)
+    choice_entries[np.arange(len(order)) + np.repeat(offsets[:-1] - starts, counts)] = order
     label_offsets = offsets_of(np.bincount(distinct // len(sizes), minlength=num_labels))
-    return Choices(label_offsets, distinct % len(sizes), offsets, found)
+    return Choices(label_offsets, distinct % len(sizes), offsets, choice_entries)
 
 
 def _ways(choices: Choices, num_labels: int) -> Floats:
@@ -231,15 +231,15 @@ def beyond_cutoff(evaluator: Evaluator, choice: Sequence[int]) -> Iterator[str]:
     if additive is None or additive.valuation.kind != EXPECTED_LOSS:
         return
     valuation = additive.valuation
-    cutoff, num = math.sqrt(valuation.params[0]), len(valuation.prior) // additive.num_horizons
-    existence = expit(valuation.prior[:num, -2])
+    cutoff, num_labels = math.sqrt(valuation.params[0]), len(valuation.prior) // additive.num_horizons
+    existence = expit(valuation.prior[:num_labels, -2])
     detected, errors = _errors(additive, choice)
-    likely, errors = detected[:num] >= 0.5, errors[:num]
+    likely, errors = detected[:num_labels] >= 0.5, errors[:num_labels]
     lost = likely & (errors > cutoff)
-    uncounted, expected = float(existence[lost].sum()), float(existence[likely].sum())
-    if uncounted > _SHARE * expected:
+    num_beyond, expected = float(existence[lost].sum()), float(existence[likely].sum())
+    if num_beyond > _SHARE * expected:
         yield (
-            f"cutoff of the expected loss, {cutoff:.4g} m: {uncounted:.2g} of {expected:.2g} targets that are likely "
+            f"cutoff of the expected loss, {cutoff:.4g} m: {num_beyond:.2g} of {expected:.2g} targets that are likely "
             f"to be detected stay beyond it and do not count, with errors up to {errors[lost].max():.3g} m; take a "
             "larger one"
         )
@@ -248,11 +248,11 @@ def beyond_cutoff(evaluator: Evaluator, choice: Sequence[int]) -> Iterator[str]:
 def _errors(additive: AdditiveRewards, choice: Sequence[int]) -> tuple[Floats, Floats]:
     """Return (num_labels,) the probability that any scan detects each label, and its error in that case, m."""
     valuation, rows = additive.valuation, additive.with_scans(np.array(choice))
-    unseen = valuation.covs[:, 0, 0] + valuation.covs[:, 1, 1]
+    predicted_square = valuation.covs[:, 0, 0] + valuation.covs[:, 1, 1]
     detected = -np.expm1(rows[:, -1, 0])
     # Without a cutoff the loss of a label is r (q tr P+ + (1 - q) tr P).
-    uncut = valuation._replace(own=unseen[:, np.newaxis], params=np.array([math.inf, 1.0, 1.0]))
-    losses = -label_values(rows, uncut)[:, 0, 0]
+    without_cutoff = valuation._replace(own=predicted_square[:, np.newaxis], params=np.array([math.inf, 1.0, 1.0]))
+    losses = -label_values(rows, without_cutoff)[:, 0, 0]
     with np.errstate(divide="ignore", invalid="ignore"):
-        squares = (losses / expit(valuation.prior[:, -2]) - (1.0 - detected) * unseen) / detected
-    return detected, np.sqrt(np.where(detected > 0.0, squares, unseen))
+        squares = (losses / expit(valuation.prior[:, -2]) - (1.0 - detected) * predicted_square) / detected
+    return detected, np.sqrt(np.where(detected > 0.0, squares, predicted_square))

@@ -80,7 +80,7 @@ class ProgramPlanner:
             pairs = mask.together.items()
             question["pairs"] = [{"sensors": list(pair), "allowed": table.tolist()} for pair, table in pairs]
         if mask is not None and mask.active is not None:
-            question["max_active"] = mask.active.most
+            question["max_active"] = mask.active.limit
         estimate = self.estimate(state.fused, state.step)
         question |= {"estimates": _target_list(estimate), "tracks": _target_list(state.fused)}
         answer = self._program.ask(question, self.seconds)
@@ -120,10 +120,10 @@ def _target_list(belief: Any) -> list[dict[str, Any]]:
 
 def _joint(program: Program, answer: dict[str, Any], options: Sequence[Options], mask: Mask | None) -> tuple[int, ...]:
     """Return the course of each sensor in the answer; refuses an invalid choice and a forbidden one."""
-    given, num = answer.get("actions"), len(options)
-    if not isinstance(given, list) or len(given) != num or any(type(each) is not int for each in given):
+    given, num_sensors = answer.get("actions"), len(options)
+    if not isinstance(given, list) or len(given) != num_sensors or any(type(each) is not int for each in given):
         got = repr(given)[:200] if "actions" in answer else f"only {', '.join(answer) or 'an empty object'}"
-        program.refuse(f'"actions": {num} whole numbers, one a sensor', got)
+        program.refuse(f'"actions": {num_sensors} whole numbers, one a sensor', got)
     for s, (course, own) in enumerate(zip(given, options, strict=True)):
         if not 0 <= course < len(own.courses):
             program.refuse(f"actions[{s}] from 0 to {len(own.courses) - 1}", str(course))
@@ -135,14 +135,14 @@ def _joint(program: Program, answer: dict[str, Any], options: Sequence[Options],
                 wanted = f"actions[{first}] and actions[{second}] that are allowed together"
                 program.refuse(wanted, f"{given[first]} and {given[second]}")
         if mask.active is not None and (excess := int(mask.active.excess(np.array([given]))[0])):
-            program.refuse(f"actions with at most {mask.active.most} sensors on", f"{mask.active.most + excess} on")
+            program.refuse(f"actions with at most {mask.active.limit} sensors on", f"{mask.active.limit + excess} on")
     return tuple(given)
 
 
 def _counts(program: Program, answer: dict[str, Any]) -> dict[str, int]:
     """Return the evaluation counts that the program reports."""
     counts = answer.get("counts", {})
-    known = isinstance(counts, dict) and set(counts) <= set(COUNTED)
-    if not known or any(type(each) is not int or not 0 <= each < 2**53 for each in counts.values()):
+    is_valid = isinstance(counts, dict) and set(counts) <= set(COUNTED)
+    if not is_valid or any(type(each) is not int or not 0 <= each < 2**53 for each in counts.values()):
         program.refuse(f'"counts": whole numbers of {", ".join(COUNTED)}', repr(counts))
     return dict(counts)

@@ -99,31 +99,31 @@ class PseudoPosteriorRewards:
         """Return the reward function of one sensor's own density; its actions have shape (num, 1)."""
         return self.rewards((sensor,), None)
 
-    def rewards(self, which: Sequence[int], fusion: Fusion | None) -> SampleRewards:
-        """Return a function from joint actions (num_joint, num of `which`) to rewards (num_joint, num_samples).
+    def rewards(self, sensors: Sequence[int], fusion: Fusion | None) -> SampleRewards:
+        """Return a function from joint actions (num_joint, num of `sensors`) to rewards (num_joint, num_samples).
 
-        which: the sensors that act. Actions are indices of distinct courses. fusion: None for a single sensor, whose
+        sensors: those that act. Actions are indices of distinct courses. fusion: None for a single sensor, whose
         own density is compared with the prediction. The function raises `NumericalError` with the action and the sample
         if a reward is not finite.
         """
-        compute = self._compute([self.posteriors[s] for s in which], fusion)
+        compute = self._compute([self.posteriors[s] for s in sensors], fusion)
 
         def evaluate(actions: Ints) -> Floats:
-            prices = [self.options[s].prices[own] for s, own in zip(which, actions.T, strict=True)]
+            prices = [self.options[s].prices[own] for s, own in zip(sensors, actions.T, strict=True)]
             rewards = np.asarray(compute(actions) - np.sum(prices, axis=0)[:, np.newaxis])
             self.counts["divergences"] += rewards.size
             self.counts["fusions"] += rewards.size if fusion is not None else 0
-            self._check_finite(which, actions, rewards)
+            self._check_finite(sensors, actions, rewards)
             return rewards
 
         return evaluate
 
     def _compute(self, posteriors: Sequence[DensityBatch], fusion: Fusion | None) -> SampleRewards:
-        laid = lay_out_rewards(posteriors, self.prediction, fusion, self.reward)
-        if not isinstance(laid, str):
-            return laid
-        self.notes[f"rewards were computed one by one: {laid}"] = None
-        warn_slow(laid)
+        compute_or_reason = lay_out_rewards(posteriors, self.prediction, fusion, self.reward)
+        if not isinstance(compute_or_reason, str):
+            return compute_or_reason
+        self.notes[f"rewards were computed one by one: {compute_or_reason}"] = None
+        warn_slow(compute_or_reason)
         return PlainRewards(posteriors, self.prediction, fusion, self.reward, self.settings.num_samples, self.views)
 
     def views(self, chosen: Sequence[int]) -> FieldsOfView:
@@ -133,11 +133,11 @@ class PseudoPosteriorRewards:
         scanned = tuple(bool(own[course]) for own, course in zip(self.scanned, chosen, strict=True))
         return FieldsOfView(models, poses, scanned, self.prediction)
 
-    def _check_finite(self, which: Sequence[int], actions: Ints, rewards: Floats) -> None:
+    def _check_finite(self, sensors: Sequence[int], actions: Ints, rewards: Floats) -> None:
         bad = np.argwhere(~np.isfinite(rewards))
         if len(bad):
             joint, sample = bad[0].tolist()
-            courses = zip(which, actions[joint].tolist(), strict=True)
+            courses = zip(sensors, actions[joint].tolist(), strict=True)
             named = (
                 f"action {self.options[s].actions.text(self.options[s].first_action(course))} of sensor {s + 1}"
                 for s, course in courses
@@ -160,14 +160,14 @@ def lay_out_rewards(
     """
     if not provides(reward, PowerReward) or not may_replace(reward, "combine", "__call__"):
         return f"{_name(reward)} is a function of two densities"
-    laid: PrecomputedFusion | None = None
+    precomputed: PrecomputedFusion | None = None
     if fusion is None:
-        laid = precompute_single_sensor(cases[0], prediction)
+        precomputed = precompute_single_sensor(cases[0], prediction)
     elif provides(fusion, SupportsPrecomputation) and may_replace(fusion, "precompute", "fuse"):
-        laid = fusion.precompute(cases, prediction)
-    if laid is None:
+        precomputed = fusion.precompute(cases, prediction)
+    if precomputed is None:
         return f"{'a sensor alone' if fusion is None else _name(fusion)} cannot lay out these beliefs"
-    z, volume = laid.z, unit_volume_of(reward, prediction)
+    z, volume = precomputed.z, unit_volume_of(reward, prediction)
     return lambda actions: combined(reward, z(actions, reward.exponents, volume))
 
 

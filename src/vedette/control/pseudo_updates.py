@@ -143,9 +143,9 @@ def _counts(settings: PlanningSettings) -> dict[str, int]:
 def heaviest_hypotheses(belief: GLMB, max_hypotheses: int) -> GLMB:
     """Return the `max_hypotheses` heaviest hypotheses of positive weight, normalised; of equal weights the first."""
     order = np.argsort(-belief.hyp_log_weights, kind="stable")[:max_hypotheses]
-    taken = take_hypotheses(belief, order[belief.hyp_log_weights[order] > -np.inf])
-    log_weights = taken.hyp_log_weights - log_sum(for_kernel(taken.hyp_log_weights))
-    return taken.with_fields(hyp_log_weights=log_weights)
+    heaviest = take_hypotheses(belief, order[belief.hyp_log_weights[order] > -np.inf])
+    log_weights = heaviest.hyp_log_weights - log_sum(for_kernel(heaviest.hyp_log_weights))
+    return heaviest.with_fields(hyp_log_weights=log_weights)
 
 
 def merge_similar_tracks(belief: GLMB, max_divergence: float) -> GLMB:
@@ -174,9 +174,9 @@ def _divergences(means: Floats, covs: Floats) -> Floats:
 def _leaders(belief: GLMB, divergences: Floats, max_divergence: float) -> Ints:
     """Return (num_tracks,) the track that replaces each; its own index if it stays, or if no hypothesis has it."""
     labels, leaders = belief.tracks.labels.tolist(), np.arange(belief.tracks.num_tracks)
-    known: dict[tuple[int, ...], list[int]] = {}
+    leaders_of: dict[tuple[int, ...], list[int]] = {}
     for track in dict.fromkeys(belief.hyp_tracks.tolist()):
-        own = known.setdefault(tuple(labels[track]), [])
+        own = leaders_of.setdefault(tuple(labels[track]), [])
         near = [leader for leader in own if divergences[track, leader] <= max_divergence]
         if near:
             leaders[track] = near[0]

@@ -108,7 +108,9 @@ class RulePlanner:
         )
         if mask is not None:
             if mask.active is not None:
-                joint = mask.active.kept(joint, [own[course] for own, course in zip(merits, joint, strict=True)])
+                joint = mask.active.within_limit(
+                    joint, [own[course] for own, course in zip(merits, joint, strict=True)]
+                )
             joint = nearest_feasible(mask, joint)
         chosen = tuple(own.first_action(course) for own, course in zip(options, joint, strict=True))
         notes = (*(mask.notes if mask else ()), *(beyond.notes() if beyond else ()))
@@ -131,11 +133,11 @@ def _merits(own: Options, goal: Floats | None, graph: VisibilityGraph | None) ->
     if goal is None:
         return np.zeros(len(own.courses))
     offsets = goal - own.courses[..., :2]
-    gaps, waits = np.hypot(offsets[..., 0], offsets[..., 1]), np.zeros(len(own.courses))
+    gaps, waiting_costs = np.hypot(offsets[..., 0], offsets[..., 1]), np.zeros(len(own.courses))
     if graph is not None:
         paths, moves = graph.to(goal[np.newaxis], own.pose[:2]), (own.courses[..., :2] != own.pose[:2]).any(axis=(1, 2))
         if not paths.are_straight(own.pose[np.newaxis, :2].copy())[0, 0]:  # The sensor may have to step aside first.
-            waits[~moves] = _WAITING
+            waiting_costs[~moves] = _WAITING
         free = moves & ~graph.is_blocked(own.pose[:2], own.courses[..., :2])
         around = paths.distances(own.courses[free, :, :2].reshape(-1, 2)).reshape(gaps[free].shape)
         gaps[free] = np.where(np.isfinite(around), around, gaps[free])
@@ -143,4 +145,4 @@ def _merits(own: Options, goal: Floats | None, graph: VisibilityGraph | None) ->
     if own.courses.shape[2] > HALF_WIDTH and (own.courses[..., HALF_WIDTH] > 0.0).any():
         turn = np.arctan2(offsets[..., 1], offsets[..., 0]) - own.courses[..., POINTING]
         near = near + _AIM * max(1.0, float(-near.min())) * np.cos(turn).mean(axis=1)
-    return np.asarray(near - waits)
+    return np.asarray(near - waiting_costs)

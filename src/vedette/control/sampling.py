@@ -36,6 +36,6 @@ def targets_of(table: Ints, labels: Ints, offsets: Ints) -> Ints:
     """
     rows = places_of(labels, table)
     of_sample = np.repeat(np.arange(len(offsets) - 1), np.diff(offsets))
-    targets, known = np.full((len(table), len(offsets) - 1), -1), rows >= 0
-    targets[rows[known], of_sample[known]] = np.flatnonzero(known)
+    targets, exists = np.full((len(table), len(offsets) - 1), -1), rows >= 0
+    targets[rows[exists], of_sample[exists]] = np.flatnonzero(exists)
     return targets

@@ -128,9 +128,9 @@ def one_a_sensor(num_sensors: int, **fields: Any) -> None:
             continue
         if not isinstance(values, Sequence | np.ndarray) or isinstance(values, str | bytes):
             raise reject(field, f"{num_sensors}, one a sensor", None if values is None else type(values).__name__)
-        came = 0 if isinstance(values, np.ndarray) and values.ndim == 0 else len(values)
-        if came != num_sensors:
-            raise reject(field, f"{num_sensors}, one a sensor", came)
+        num_values = 0 if isinstance(values, np.ndarray) and values.ndim == 0 else len(values)
+        if num_values != num_sensors:
+            raise reject(field, f"{num_sensors}, one a sensor", num_values)
 
 
 def dimension(field: str, value: Any) -> int:
@@ -207,8 +207,8 @@ def float_array(field: str, values: Any, shape: tuple[int | None, ...], *, finit
     else:
         given = as_array(field, values, "fiu", f"numbers in an array of shape {_shape_text(shape)}")
     fits = given.ndim == len(shape)
-    for wanted, length in zip(shape, given.shape, strict=False):
-        fits = fits and wanted in (None, length)
+    for expected_length, length in zip(shape, given.shape, strict=False):
+        fits = fits and expected_length in (None, length)
     if not fits:
         raise reject(field, f"an array of shape {_shape_text(shape)}", f"shape {given.shape}")
     array = np.array(given, dtype=np.float64, order="C")

@@ -62,10 +62,10 @@ def with_offsets(measured: Floats, offsets: Floats, components: Sequence[str]) -
     Rows may bring their noise, which stays.
     components: names of the measured quantities in `vedette.internal.quantities.QUANTITIES`.
     """
-    found = measured.copy()
-    found[:, : len(offsets)] += offsets
+    shifted = measured.copy()
+    shifted[:, : len(offsets)] += offsets
     for i, name in enumerate(components):
         quantity = QUANTITIES[name]
         least = quantity.least + LEAST_RANGE
-        found[:, i] = wrap_angles(found[:, i]) if quantity.is_angle else np.maximum(found[:, i], least)
-    return found
+        shifted[:, i] = wrap_angles(shifted[:, i]) if quantity.is_angle else np.maximum(shifted[:, i], least)
+    return shifted

@@ -120,8 +120,8 @@ class ClutterModel:
         for _ in range(_NUM_TRIAL_SCANS):
             for row in self.sample(at, measurement, state_dim=state_dim, rng=rng):
                 if probe_log_intensity(self.log_intensity, (row, at, self.params)) == -math.inf:
-                    where = describe(self.log_intensity, row, at)
-                    raise ModelError(f"{where}: expected a finite value, as the sampler drew clutter there; got -inf")
+                    place = describe(self.log_intensity, row, at)
+                    raise ModelError(f"{place}: expected a finite value, as the sampler drew clutter there; got -inf")
 
 
 @model_function("log_clutter_intensity")
@@ -172,8 +172,8 @@ class _BoxSampler:
     def __call__(
         self, pose: Floats, measurement: MeasurementModel, *, state_dim: int, rng: np.random.Generator
     ) -> Floats:
-        num = int(rng.poisson(self.rate))
-        drawn = rng.uniform(self.low, self.high, size=(num, len(self.low)))
+        num_clutter = int(rng.poisson(self.rate))
+        drawn = rng.uniform(self.low, self.high, size=(num_clutter, len(self.low)))
         return wrap_angular(drawn, measurement.angular) if measurement.meas_dim == len(self.low) else drawn
 
 

@@ -64,8 +64,8 @@ class DetectionModel:
         for state in state_table("states", states):
             chance, offset = probe_probability(self.function, (state, at, self.params)), state[:2] - at[:2]
             if chance > 0.0 and offset @ offset > self.reach**2:
-                told = f"0, as its reach is {self.reach:g} m; got {chance:g}"
-                raise ModelError(f"{describe(self.function, state, at, self.params)}: expected {told}")
+                expected = f"0, as its reach is {self.reach:g} m; got {chance:g}"
+                raise ModelError(f"{describe(self.function, state, at, self.params)}: expected {expected}")
             if self.mean_function is not None:
                 probe_probability(self.mean_function, (state, np.eye(len(state)), at, self.params))
 

@@ -73,8 +73,8 @@ def _in_sector(dx: float, dy: float, max_range: float, middle: float, half_width
 def limited_sector(state: Floats, pose: Floats, params: Floats) -> float:
     """params: probability, max_range, half_width_rad, outside."""
     dx, dy = offset_at_beam(state, pose)
-    seen = _in_sector(dx, dy, params[1], pose[2], params[2])
-    return params[0] if seen else params[3]  # type: ignore[no-any-return]
+    in_view = _in_sector(dx, dy, params[1], pose[2], params[2])
+    return params[0] if in_view else params[3]  # type: ignore[no-any-return]
 
 
 @model_function("mean_prob_detection")
@@ -121,8 +121,8 @@ def camera(state: Floats, pose: Floats, params: Floats) -> float:
     """params: probability, max_range, reference half width (0: none)."""
     reach = _reach(pose, params)
     dx, dy = offset_at_beam(state, pose)
-    seen = _in_sector(dx, dy, reach, pose[3], pose[4])
-    return params[0] if seen else 0.0
+    in_view = _in_sector(dx, dy, reach, pose[3], pose[4])
+    return params[0] if in_view else 0.0
 
 
 @model_function("mean_prob_detection")

@@ -70,11 +70,11 @@ def model_function(kind: str) -> Callable[[Callable[..., Any]], ModelFunction]:
 
 def require_kind(field: str, function: Any, kind: str) -> None:
     """Raise `InputError` unless `function` was made by `@model_function(kind)`."""
-    got = getattr(function, "kind", None)
-    if got == kind and callable(function):
+    given_kind = getattr(function, "kind", None)
+    if given_kind == kind and callable(function):
         return
-    came = repr(function) if got is None else f"a function of kind {got!r}"
-    raise reject(field, f"a function decorated with @model_function({kind!r})", came)
+    description = repr(function) if given_kind is None else f"a function of kind {given_kind!r}"
+    raise reject(field, f"a function decorated with @model_function({kind!r})", description)
 
 
 def describe(function: ModelFunction, *args: Any) -> str:

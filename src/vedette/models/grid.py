@@ -40,13 +40,14 @@ class CellGrid:
             object.__setattr__(self, name, dimension(f"CellGrid.{name}", getattr(self, name)))
 
     @classmethod
-    def covering(cls, region: Region, cell: float) -> CellGrid:
-        """Return the grid with the fewest cells of at most `cell` m per side; raise `InputError` unless above 0."""
-        size = positive("cell", cell)
+    def covering(cls, region: Region, cell_size: float) -> CellGrid:
+        """Return the grid with the fewest cells of at most `cell_size` m (above 0) per side; may raise `InputError`."""
+        size = positive("cell_size", cell_size)
         instance("region", region, Region)
         width, height = region.x_max - region.x_min, region.y_max - region.y_min
         if max(width, height) / size > _MOST_CELLS:
-            raise reject("cell", f"at least {max(width, height) / _MOST_CELLS:g}, for cells that can be numbered", cell)
+            expected = f"at least {max(width, height) / _MOST_CELLS:g}, for cells that can be numbered"
+            raise reject("cell_size", expected, cell_size)
         return cls(region, *(max(math.ceil(side / size - _ROUNDING), 1) for side in (width, height)))
 
     @property

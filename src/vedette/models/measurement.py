@@ -108,19 +108,23 @@ class MeasurementModel:
 
     def __post_init__(self) -> None:
         dimension("MeasurementModel.meas_dim", self.meas_dim)
-        known = [QUANTITIES[name] for name in self.components if name in QUANTITIES]
-        if self.components and len(known) != self.meas_dim:
-            wanted = f"{self.meas_dim} names among {', '.join(QUANTITIES)}, or none"
-            raise reject("MeasurementModel.components", wanted, self.components)
+        quantities = [QUANTITIES[name] for name in self.components if name in QUANTITIES]
+        if self.components and len(quantities) != self.meas_dim:
+            expected = f"{self.meas_dim} names among {', '.join(QUANTITIES)}, or none"
+            raise reject("MeasurementModel.components", expected, self.components)
         require_kind("MeasurementModel.function", self.function, "measurement")
         if self.jacobian is not None:
             require_kind("MeasurementModel.jacobian", self.jacobian, "measurement_jacobian")
         if self.places is not None and not callable(self.places):
             raise reject("MeasurementModel.places", "a function or None", self.places)
         object.__setattr__(self, "params", params_vector("MeasurementModel.params", self.params))
-        least = self.least if np.size(self.least) else [each.least for each in known] or np.full(self.meas_dim, -np.inf)
+        least = (
+            self.least
+            if np.size(self.least)
+            else [each.least for each in quantities] or np.full(self.meas_dim, -np.inf)
+        )
         object.__setattr__(self, "least", float_array("MeasurementModel.least", least, (self.meas_dim,), finite=False))
-        angular = self.angular if np.size(self.angular) else [each.is_angle for each in known]
+        angular = self.angular if np.size(self.angular) else [each.is_angle for each in quantities]
         object.__setattr__(self, "angular", angular_flags("MeasurementModel.angular", angular, self.meas_dim))
 
     def measure(self, states: ArrayLike, pose: ArrayLike) -> Floats:
@@ -160,8 +164,8 @@ class MeasurementModel:
             raise reject("MeasurementModel.places", "a function, as births from measurements need a position", None)
         at = pose_vector("pose", pose)
         try:
-            found = np.asarray(self.places(measurements, at), np.float64)
-            return float_array("places", found, (len(measurements), 3 if found.shape[1:] == (3,) else 2))
+            places = np.asarray(self.places(measurements, at), np.float64)
+            return float_array("places", places, (len(measurements), 3 if places.shape[1:] == (3,) else 2))
         except Exception as error:
             raise ModelError(f"places of measurements at pose {at}: {type(error).__name__}: {error}") from error
 

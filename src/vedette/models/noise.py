@@ -128,14 +128,14 @@ def range_dependent_noise(
     ranges = _growth("range", sigma_range, eta_range)
     bearings = _growth("bearing", sigma_bearing, eta_bearing)
     thirds = {"range_rate": sigma_range_rate, "elevation": sigma_elevation, "altitude": sigma_altitude}
-    given = [(f"sigma_{name}", sigma) for name, sigma in thirds.items() if sigma is not None]
-    for name, sigma in given:
+    given_thirds = [(f"sigma_{name}", sigma) for name, sigma in thirds.items() if sigma is not None]
+    for name, sigma in given_thirds:
         if not (ranges and bearings):
             raise reject(name, "None where no sigma_range and sigma_bearing are given", sigma)
-        if (name, sigma) != given[0]:
-            raise reject(name, f"None beside {given[0][0]}, as one third component is measured", sigma)
-    if given:
-        std = positive(*given[0])
+        if (name, sigma) != given_thirds[0]:
+            raise reject(name, f"None beside {given_thirds[0][0]}, as one third component is measured", sigma)
+    if given_thirds:
+        std = positive(*given_thirds[0])
         return NoiseModel(_with_third, np.array([*ranges, *bearings, std]), 3, np.array([bearings[0], ranges[0], std]))
     if ranges and bearings:
         return NoiseModel(_bearing_range, np.array(ranges + bearings), 2, np.array([bearings[0], ranges[0]]))

@@ -49,9 +49,9 @@ def _checked_call(function: ModelFunction, *args: Any) -> Any:
     before = _copies(args)
     result = call(function, *args)
     names = SIGNATURES[function.kind][0]  # type: ignore[attr-defined]
-    for name, was, now in zip(names, before, args, strict=True):
-        if name != "out" and isinstance(now, np.ndarray) and not np.array_equal(was, now, equal_nan=True):
-            raise _fault(function, before, f"{name!r} to be left as it was", now)
+    for name, old, new in zip(names, before, args, strict=True):
+        if name != "out" and isinstance(new, np.ndarray) and not np.array_equal(old, new, equal_nan=True):
+            raise _fault(function, before, f"{name!r} to be left as it was", new)
     return result
 
 
@@ -77,8 +77,8 @@ def probe_covariance(function: ModelFunction, args: tuple[Any, ...], dim: int, *
     stds = np.sqrt(np.where(variances > 0.0, variances, 1.0))
     lowest = float(np.linalg.eigvalsh(cov / np.outer(stds, stds))[0])
     if lowest <= 0.0 if definite else lowest < -EIGENVALUE_TOLERANCE:
-        wanted = "a positive definite matrix" if definite else "a positive semidefinite matrix"
-        raise _fault(function, args, wanted, cov.tolist())
+        expected = "a positive definite matrix" if definite else "a positive semidefinite matrix"
+        raise _fault(function, args, expected, cov.tolist())
     return cov
 
 

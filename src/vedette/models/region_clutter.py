@@ -204,12 +204,12 @@ class _RegionSampler:
     def __call__(
         self, pose: Floats, measurement: MeasurementModel, *, state_dim: int, rng: np.random.Generator
     ) -> Floats:
-        num = int(rng.poisson(self.rate))
-        states = np.zeros((num, state_dim))
-        states[:, :2] = self.region.sample(num, rng=rng)
+        num_clutter = int(rng.poisson(self.rate))
+        states = np.zeros((num_clutter, state_dim))
+        states[:, :2] = self.region.sample(num_clutter, rng=rng)
         if self.kind in HEIGHT_DEPENDENT:
-            states[:, HEIGHT] = rng.uniform(0.0, self.largest, num)
-        drawn = np.empty((num, measurement.meas_dim))
+            states[:, HEIGHT] = rng.uniform(0.0, self.largest, num_clutter)
+        drawn = np.empty((num_clutter, measurement.meas_dim))
         write_rows(measurement.function, states, pose, measurement.params, drawn)
         return with_rates(drawn, self.kind, self.largest, rng)
 

@@ -76,10 +76,10 @@ class SensorModel:
             if not isinstance(getattr(self, name), kind):
                 raise reject(f"SensorModel.{name}", f"a {kind.__name__}", getattr(self, name))
         object.__setattr__(self, "meas_dim", self.measurement.meas_dim)
-        for name, served in (("noise", self.noise.meas_dim), ("clutter", self.clutter.meas_dim)):
-            if served is not None and served != self.meas_dim:
+        for name, served_dim in (("noise", self.noise.meas_dim), ("clutter", self.clutter.meas_dim)):
+            if served_dim is not None and served_dim != self.meas_dim:
                 expected = f"a model for {self.meas_dim} measurement components"
-                raise reject(f"SensorModel.{name}", expected, f"one for {served}")
+                raise reject(f"SensorModel.{name}", expected, f"one for {served_dim}")
         angular = self.clutter.angular
         if angular is not None and not np.array_equal(angular, self.measurement.angular):
             expected = f"a model for measurements whose angular flags are {self.measurement.angular.tolist()}"
@@ -96,10 +96,10 @@ class SensorModel:
         for component in np.flatnonzero(self.measurement.angular & (stds > LARGE_ANGLE)).tolist():
             field = "SensorModel.noise"
             expected = f"a standard deviation of component {component}, an angle, in radians"
-            got, meant = f"{stds[component]:g}", "is it in degrees, or are components exchanged"
+            got, question = f"{stds[component]:g}", "is it in degrees, or are components exchanged"
             if stds[component] > math.pi:
-                raise reject(field, f"{expected}, up to pi", f"{got} ({meant}?)")
-            warn_implausible(field, expected, got, meant)
+                raise reject(field, f"{expected}, up to pi", f"{got} ({question}?)")
+            warn_implausible(field, expected, got, question)
 
     def to_kernel(self, detection_at: str | None = None) -> Sensor:
         """Return the functions and parameters for kernels.

@@ -101,17 +101,17 @@ class _AroundSampler:
     def __call__(
         self, pose: Floats, measurement: MeasurementModel, *, state_dim: int, rng: np.random.Generator
     ) -> Floats:
-        num, heading = int(rng.poisson(self.rate)), float(pose[2])
-        share = rng.uniform(size=(num, 2))
+        num_clutter, heading = int(rng.poisson(self.rate)), float(pose[2])
+        share = rng.uniform(size=(num_clutter, 2))
         angles = heading + self.half_width * (2.0 * share[:, 0] - 1.0)
-        reach = np.full(num, self.size)
+        reach = np.full(num_clutter, self.size)
         if self.is_square:
             # Inverse of the area up to an angle, so that equal areas are equally likely.
             ends = [_square_up_to(heading + side * self.half_width) for side in (-1.0, 1.0)]
             quarters, rest = np.divmod(ends[0] + share[:, 0] * (ends[1] - ends[0]), 1.0)
             within = np.arctan(2.0 * rest - 1.0)
             angles, reach = 0.5 * math.pi * quarters + within, self.size / np.cos(within)
-        states = np.zeros((num, state_dim))
+        states = np.zeros((num_clutter, state_dim))
         distances = reach * np.sqrt(share[:, 1])
         states[:, 0] = pose[0] + distances * np.cos(angles)
         states[:, 1] = pose[1] + distances * np.sin(angles)

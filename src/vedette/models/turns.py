@@ -49,11 +49,11 @@ def with_beam(pose: ArrayLike, velocity: ArrayLike, bearing: float, rate: float)
         InputError: an array has another shape or a number that is not finite.
     """
     own = pose_vector("pose", pose)
-    found = np.zeros(max(len(own), BEAM + 2))
-    found[: len(own)] = own
-    found[OWN_VELOCITY:BEAM] = float_array("velocity", velocity, (2,))
-    found[BEAM : BEAM + 2] = bearing, rate
-    return found
+    pose_with_beam = np.zeros(max(len(own), BEAM + 2))
+    pose_with_beam[: len(own)] = own
+    pose_with_beam[OWN_VELOCITY:BEAM] = float_array("velocity", velocity, (2,))
+    pose_with_beam[BEAM : BEAM + 2] = bearing, rate
+    return pose_with_beam
 
 
 def is_turn(poses: Floats) -> bool:

@@ -74,8 +74,8 @@ class UndetectedModel:
 
     def initial(self) -> Floats:
         """Return the mean number of undetected targets in each cell just before the first scan, (num_cells,)."""
-        num = self.grid.num_cells
-        return np.full(num, self.expected / num) if np.ndim(self.expected) == 0 else np.array(self.expected)
+        num_cells = self.grid.num_cells
+        return np.full(num_cells, self.expected / num_cells) if np.ndim(self.expected) == 0 else np.array(self.expected)
 
     @property
     def is_learnt(self) -> bool:

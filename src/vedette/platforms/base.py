@@ -149,7 +149,7 @@ class Actions(SummaryRepr):
 
 @runtime_checkable
 class Platform(Protocol):
-    """The carrier of a sensor: its possible actions, and the poses that follow.
+    """Platform of a sensor: its possible actions, and the poses that follow.
 
     A pose is [px, py, heading_rad, ...]. All sensors of a run have poses of the same length, the largest of any;
     components that a platform does not use are 0. A platform receives them too, and need not return them.

@@ -71,8 +71,8 @@ class ByCompass:
 
     @property
     def _parts(self) -> tuple[Platform, ...]:
-        found = self.platform
-        return (found.carrier, found.pointing) if isinstance(found, MountedPlatform) else (found,)
+        platform = self.platform
+        return (platform.platform, platform.pointing) if isinstance(platform, MountedPlatform) else (platform,)
 
     def _given(self, rows: Floats, pose: Floats, *, fixed: bool) -> Floats:
         """Return converted rows (num_rows, num_columns) of the platform's own columns.
@@ -97,9 +97,9 @@ class ByCompass:
         return np.hstack(found)
 
     def _pose_of(self, part: Platform, pose: Floats) -> Floats:
-        """Return the pose that `MountedPlatform` passes on: a carrier gets position and heading only."""
-        is_carrier = isinstance(self.platform, MountedPlatform) and part is self.platform.carrier
-        return pose[:3] if is_carrier else pose
+        """Return the pose that `MountedPlatform` passes on: the mounting platform gets position and heading only."""
+        is_mounting = isinstance(self.platform, MountedPlatform) and part is self.platform.platform
+        return pose[:3] if is_mounting else pose
 
 
 def _is_fixed(part: Platform) -> bool:

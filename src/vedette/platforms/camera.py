@@ -115,48 +115,48 @@ class MountedPlatform:
     """A pointing sensor mounted on a moving platform; the actions are all combinations of both, columns side by side.
 
     Attributes:
-        carrier: controls position and heading, and receives a pose of these three.
+        platform: controls position and heading, and receives a pose of these three.
         pointing: controls all other components of the pose.
 
     Raises:
         InputError: one of them is not a platform, or both have a column of the same name.
     """
 
-    carrier: Platform
+    platform: Platform
     pointing: Platform
 
     def __post_init__(self) -> None:
-        for name in ("carrier", "pointing"):
+        for name in ("platform", "pointing"):
             check_platform(name, getattr(self, name))
         if len(set(self.columns)) < len(self.columns):
-            raise reject("pointing", f"columns other than {', '.join(self.carrier.columns)}", self.pointing.columns)
+            raise reject("pointing", f"columns other than {', '.join(self.platform.columns)}", self.pointing.columns)
 
     @property
     def columns(self) -> tuple[str, ...]:
-        """Columns of the carrier, then those of the pointing."""
-        return (*self.carrier.columns, *self.pointing.columns)
+        """Columns of the platform, then those of the pointing."""
+        return (*self.platform.columns, *self.pointing.columns)
 
     def actions(self, pose: Floats) -> Floats:
         """Return (num_actions, num_columns), the pointing's actions fastest."""
-        moves = np.asarray(self.carrier.actions(pose[:3].copy()), np.float64)
+        moves = np.asarray(self.platform.actions(pose[:3].copy()), np.float64)
         turns = np.asarray(self.pointing.actions(pose), np.float64)
         return np.hstack([np.repeat(moves, len(turns), axis=0), np.tile(turns, (len(moves), 1))])
 
     def course(self, pose: Floats, action: Floats, times: Floats) -> Floats:
         """Return poses composed of the components of both."""
-        num = len(self.carrier.columns)
-        poses = np.array(self.pointing.course(pose.copy(), action[num:], times), np.float64)
-        poses[:, :3] = np.asarray(self.carrier.course(pose[:3].copy(), action[:num], times))[:, :3]
+        num_columns = len(self.platform.columns)
+        poses = np.array(self.pointing.course(pose.copy(), action[num_columns:], times), np.float64)
+        poses[:, :3] = np.asarray(self.platform.course(pose[:3].copy(), action[:num_columns], times))[:, :3]
         return poses
 
     def prices(self, actions: Floats) -> Floats:
         """Return prices (num_actions,), the sums of both."""
-        num = len(self.carrier.columns)
-        carried = prices_of("carrier", self.carrier, actions[:, :num])
-        return carried + prices_of("pointing", self.pointing, actions[:, num:])
+        num_columns = len(self.platform.columns)
+        prices = prices_of("platform", self.platform, actions[:, :num_columns])
+        return prices + prices_of("pointing", self.pointing, actions[:, num_columns:])
 
     def scans(self, pose: Floats, actions: Floats, times: Floats) -> Bools:
         """Return (num_actions, num_times) whether both let the sensor scan."""
-        num = len(self.carrier.columns)
-        carried = scans_of("carrier", self.carrier, pose[:3], actions[:, :num], times)
-        return carried & scans_of("pointing", self.pointing, pose, actions[:, num:], times)
+        num_columns = len(self.platform.columns)
+        scans = scans_of("platform", self.platform, pose[:3], actions[:, :num_columns], times)
+        return scans & scans_of("pointing", self.pointing, pose, actions[:, num_columns:], times)

@@ -53,10 +53,10 @@ def table_of_detections(
                 columns[column].append(cell)
             places.append(own if values or not places else places[-1])
             numbers.append(number)
-    known = [k for k, place in enumerate(places) if place is not None]
-    if known:
+    with_place = [k for k, place in enumerate(places) if place is not None]
+    if with_place:
         cells = list(columns.values())[2]  # cells of empty scans before all others
-        places[: known[0]] = [places[known[0]] if cell is None else None for cell in cells[: known[0]]]
+        places[: with_place[0]] = [places[with_place[0]] if cell is None else None for cell in cells[: with_place[0]]]
         if None in places:
             expected = "a measurement_model with a translation_offset, as others have"
             raise InputError(f"detections, scan {numbers[places.index(None)]}: expected {expected}; got none")

@@ -64,8 +64,8 @@ class AdditiveRewards:
         """Coefficients of the sums, if the reward is linear in them; None if it is not known to be linear."""
         if self.reward is None:
             return np.ones(1)
-        found = self.reward.coefficients if provides(self.reward, LinearReward) else None
-        return None if found is None else np.asarray(found, np.float64)
+        values = self.reward.coefficients if provides(self.reward, LinearReward) else None
+        return None if values is None else np.asarray(values, np.float64)
 
     def joint(self) -> AdditiveRewards:
         """Return the rewards of all sensors, fused: this object."""
@@ -136,13 +136,13 @@ class AdditiveRewards:
         """Return rewards (num_courses, num_samples) of all courses of each sensor alone, sensor by sensor."""
         distinct = {id(base): base for base in self.bases}
         bases, places = np.stack(list(distinct.values())), {key: place for place, key in enumerate(distinct)}
-        which = np.array([places[id(base)] for base in self.bases])
+        base_indices = np.array([places[id(base)] for base in self.bases])
         sums = np.empty((len(self.table.offsets) - 1, self.valuation.num, self.num_samples))
 
         def work(first: int, last: int) -> None:
-            alone_values(self.table, self.valuation, bases, which, first, last, sums)
+            alone_values(self.table, self.valuation, bases, base_indices, first, last, sums)
 
-        run_chunks(work, len(which), self.num_threads, first_piece=8)
+        run_chunks(work, len(base_indices), self.num_threads, first_piece=8)
         rewards = self.of_sums(sums)
         if len(self.cells.worth):
             rewards += self._found_alone()[:, np.newaxis]
@@ -166,8 +166,8 @@ class AdditiveRewards:
 
     def _other_terms(self, actions: Ints) -> Floats:
         """Return (num_joint, 1) the terms of the rewards besides sums over labels: undetected targets less prices."""
-        found = np.array([self.found(joint) for joint in actions]) if len(self.cells.worth) else 0.0
-        return np.asarray(found - self.price(actions))[:, np.newaxis]
+        search_values = np.array([self.found(joint) for joint in actions]) if len(self.cells.worth) else 0.0
+        return np.asarray(search_values - self.price(actions))[:, np.newaxis]
 
     def _found_alone(self) -> Floats:
         """Return the value (num_courses,) of the undetected targets that each course finds alone."""
@@ -191,12 +191,12 @@ def valuation_of(reward: Any, prediction: LMB, prior: Floats) -> Valuation:
 
     prior: (num_labels, bernoulli_size) rows of the prediction.
     """
-    gaussians, num = prediction.tracks.to_kernel().components, len(prior)
+    gaussians, num_labels = prediction.tracks.to_kernel().components, len(prior)
     loss = Valuation(
         EXPECTED_LOSS,
         1,
         prior,
-        np.zeros((num, 1)),
+        np.zeros((num_labels, 1)),
         np.empty((0, 2)),
         0.0,
         np.empty(0),
@@ -206,15 +206,17 @@ def valuation_of(reward: Any, prediction: LMB, prior: Floats) -> Valuation:
     )
     if isinstance(reward, ExpectedLossReward):
         covs = prediction.tracks.covs
-        unseen = np.minimum(covs[:, 0, 0] + covs[:, 1, 1], reward.cutoff**2)[:, np.newaxis] ** (0.5 * reward.order)
-        return loss._replace(own=unseen, params=np.array([reward.cutoff**2, 0.5 * reward.order, 1.0]))
+        undetected_losses = np.minimum(covs[:, 0, 0] + covs[:, 1, 1], reward.cutoff**2)[:, np.newaxis] ** (
+            0.5 * reward.order
+        )
+        return loss._replace(own=undetected_losses, params=np.array([reward.cutoff**2, 0.5 * reward.order, 1.0]))
     if provides(reward, PowerReward):
         log_volume = math.log(unit_volume_of(reward, prediction))
         exponents = np.array([[float(a), float(b)] for a, b in reward.exponents])
         own = _of_prediction(prediction, exponents, log_volume, prior[:, -2])
         powers = loss._replace(kind=POWER_INTEGRALS, num=len(exponents), own=own)
         return powers._replace(exponents=exponents, log_volume=log_volume)
-    own, params = np.zeros((num, reward.num_terms)), np.ascontiguousarray(reward.params, np.float64)
+    own, params = np.zeros((num_labels, reward.num_terms)), np.ascontiguousarray(reward.params, np.float64)
     return loss._replace(kind=FUNCTION, num=reward.num_terms, own=own, params=params, function=reward.function)
 
 

@@ -142,13 +142,13 @@ def _group(
     sensor, settings = task.sensors[members[0]], task.settings
     futures = samples.futures(sensor.filter.sensor.meas_dim, settings, rng=rng)
     courses = np.concatenate([task.options[s].courses for s in members])
-    when = np.concatenate([scans[s] for s in members])
-    decision = decision_of(sensor, courses, futures, settings, when, None if task.sampled else "mean")
+    scans_at = np.concatenate([scans[s] for s in members])
+    decision = decision_of(sensor, courses, futures, settings, scans_at, None if task.sampled else "mean")
     labels, now, paths, rows = _without_scans(task.prediction, task.state.local[members[0]], decision, prior)
     targets = np.ascontiguousarray(samples.targets[labels])
     offsets = offsets_of([len(task.options[s].courses) for s in members])
-    known = Belief(now, paths, targets, label_radii(paths, targets, samples.states))
-    return SensorGroup(members, known, labels, decision, rows, offsets, sensor.filter.sensor.detection.reach)
+    belief = Belief(now, paths, targets, label_radii(paths, targets, samples.states))
+    return SensorGroup(members, belief, labels, decision, rows, offsets, sensor.filter.sensor.detection.reach)
 
 
 def _without_scans(

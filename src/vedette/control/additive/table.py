@@ -95,9 +95,9 @@ def lay_out_changes(start: SensorGroups, rule: LogLinearPool, num_threads: int, 
     for group, reach in zip(start.groups, reached, strict=True):
         places = places_of_courses(group, first_courses)
         entries = Entries(offsets[places], offsets[places + 1], own)
-        found, counts = np.nonzero(reach)[1], reach.sum(axis=1)
-        at = np.repeat(entries.first - offsets_of(counts)[:-1], counts) + np.arange(len(found))
-        own[at], labels[at] = found, group.labels[found]
+        reached_labels, counts = np.nonzero(reach)[1], reach.sum(axis=1)
+        at = np.repeat(entries.first - offsets_of(counts)[:-1], counts) + np.arange(len(reached_labels))
+        own[at], labels[at] = reached_labels, group.labels[reached_labels]
         work = _filling(group, entries, start, changes, sampled)
         run_chunks(work, len(places), num_threads, first_piece=_SAMPLED if sampled else _UNSAMPLED)
     powers = np.array(rule.powers)
@@ -110,10 +110,10 @@ def lay_out_changes(start: SensorGroups, rule: LogLinearPool, num_threads: int, 
 
 def _seen(table: Table) -> Table:
     """Return the table without the entries of labels that are certain to be missed."""
-    kept = table.changes[:, -1, 0] < 0.0
+    detectable = table.changes[:, -1, 0] < 0.0
     course = np.repeat(np.arange(len(table.offsets) - 1), np.diff(table.offsets))
-    offsets = offsets_of(np.bincount(course[kept], minlength=len(table.offsets) - 1))
-    return table._replace(offsets=offsets, labels=table.labels[kept], changes=table.changes[kept])
+    offsets = offsets_of(np.bincount(course[detectable], minlength=len(table.offsets) - 1))
+    return table._replace(offsets=offsets, labels=table.labels[detectable], changes=table.changes[detectable])
 
 
 def _reach(group: SensorGroup, num_threads: int, *, sampled: bool) -> Ints:

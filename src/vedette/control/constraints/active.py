@@ -56,33 +56,33 @@ class Active(NamedTuple):
     on: (num_courses,) whether each course scans, one array per sensor.
     off: (num_courses,) index of the course with the same poses that does not scan; the course itself if it does not
         scan, or if its sensor cannot be switched off.
-    most: number of sensors that may scan.
+    limit: number of sensors that may scan.
     """
 
     on: tuple[Bools, ...]
     off: tuple[Ints, ...]
-    most: int
+    limit: int
 
     def excess(self, actions: Ints) -> Ints:
         """Return (num,) the number of sensors that scan beyond the limit in joint actions (num, num_sensors)."""
-        num = np.zeros(len(actions), np.int64)
+        num_scanning = np.zeros(len(actions), np.int64)
         for s, own in enumerate(self.on):
-            num += own[actions[:, s]]
-        return np.maximum(num - self.most, 0)
+            num_scanning += own[actions[:, s]]
+        return np.maximum(num_scanning - self.limit, 0)
 
     def is_full(self, at: Sequence[int], sensor: int) -> bool:
         """Return True if no further sensor may scan, given the other sensors' courses; below 0: undecided, and off."""
-        return sum(bool(self.on[s][own]) for s, own in enumerate(at) if s != sensor and own >= 0) >= self.most
+        return sum(bool(self.on[s][own]) for s, own in enumerate(at) if s != sensor and own >= 0) >= self.limit
 
-    def kept(self, at: Sequence[int], gains: Sequence[float] | None = None) -> tuple[int, ...]:
-        """Return a joint action in which sensors beyond `most` are off, on courses of the same poses.
+    def within_limit(self, at: Sequence[int], gains: Sequence[float] | None = None) -> tuple[int, ...]:
+        """Return a joint action in which sensors beyond `limit` are off, on courses of the same poses.
 
         gains: value of each sensor's scans; the sensors with the largest keep scanning, of equal ones the first. None:
         sensors keep scanning in order from a sensor that depends on the joint action, so that random draws favour no
         sensor.
         """
-        scanning = [s for s, own in enumerate(at) if self.on[s][own]]
-        if len(scanning) <= self.most:
+        scanning = [s for s, course in enumerate(at) if self.on[s][course]]
+        if len(scanning) <= self.limit:
             return tuple(at)
         fixed = {s for s in scanning if self.off[s][at[s]] == at[s]}
         if gains is None:
@@ -90,8 +90,8 @@ class Active(NamedTuple):
             order = sorted(scanning, key=lambda s: (s not in fixed, (s - first) % len(at)))
         else:
             order = sorted(scanning, key=lambda s: (s not in fixed, -gains[s], s))
-        spared = set(order[: self.most])
-        return tuple(own if s in spared else int(self.off[s][own]) for s, own in enumerate(at))
+        still_scanning = set(order[: self.limit])
+        return tuple(course if s in still_scanning else int(self.off[s][course]) for s, course in enumerate(at))
 
 
 def active_of(constraints: Sequence[Constraint], courses: Sequence[Floats], scans: Sequence[Bools]) -> Active | None:

@@ -28,7 +28,7 @@ def near_pairs(centres: Floats, means: Floats, covs: Floats, radius: float) -> t
     return disc, gaussian
 
 
-def disc_probabilities(offsets: Floats, which: Ints, covs: Floats, radius: float) -> Floats:
+def disc_probabilities(offsets: Floats, gaussians: Ints, covs: Floats, radius: float) -> Floats:
     """Return the probability (num,) that a Gaussian of mean 0 is within `radius` of `offsets` (num, 2), to about 1e-13.
 
     Along the axes of the covariance, with standard deviations s <= l and offset (x, y),
@@ -38,12 +38,12 @@ def disc_probabilities(offsets: Floats, which: Ints, covs: Floats, radius: float
     where h = r cos t. As a function of t on the full circle the integrand is periodic and analytic, so the midpoint
     rule converges geometrically: 8 r / s + 40 nodes. Nodes beyond 8 s from the mean are omitted.
 
-    covs: (num_gaussians, 2, 2); `which` (num,) are their indices. Discs wholly within 8 l have probability 1, discs
+    covs: (num_gaussians, 2, 2); `gaussians` (num,) are their indices. Discs wholly within 8 l have probability 1, discs
     beyond it 0.
     """
     variances, axes = np.linalg.eigh(covs)
-    small, large = np.sqrt(np.maximum(variances, np.finfo(float).tiny))[which].T
-    x, y = (axes[which] * offsets[:, :, np.newaxis]).sum(axis=1).T
+    small, large = np.sqrt(np.maximum(variances, np.finfo(float).tiny))[gaussians].T
+    x, y = (axes[gaussians] * offsets[:, :, np.newaxis]).sum(axis=1).T
     distance = np.hypot(offsets[:, 0], offsets[:, 1])
     probabilities = (distance + _FAR * large <= radius).astype(np.float64)
     rest = np.flatnonzero((probabilities == 0.0) & (distance <= radius + _FAR * large))
@@ -51,14 +51,14 @@ def disc_probabilities(offsets: Floats, which: Ints, covs: Floats, radius: float
     first = _node(x[rest], -1.0, small[rest], half, radius)
     last = _node(x[rest], 1.0, small[rest], half, radius)
     num = np.asarray(last - first + 1.0, np.int64)
-    begun, block = 0, np.cumsum(num) // _BLOCK
-    while begun < len(rest):
-        end = int(np.searchsorted(block, block[begun], side="right"))
-        part = slice(begun, end)
+    start, block = 0, np.cumsum(num) // _BLOCK
+    while start < len(rest):
+        end = int(np.searchsorted(block, block[start], side="right"))
+        part = slice(start, end)
         chosen = rest[part]
         shape = (x[chosen], y[chosen], small[chosen], large[chosen])
         probabilities[chosen] = _midpoints(shape, radius, half[part], first[part], num[part])
-        begun = end
+        start = end
     return np.asarray(probabilities)
 
 

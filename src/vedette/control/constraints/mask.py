@@ -101,11 +101,11 @@ class Mask:
 
     def forbidden(self, at: Sequence[int], sensor: int) -> Ints:
         """Return the same numbers as `conflicts`, without the limit on the number of sensors that scan."""
-        found = (~self.single[sensor]).astype(np.int64)
+        counts = (~self.single[sensor]).astype(np.int64)
         for other, clash in self._conflicts[sensor].items():
             if at[other] >= 0:
-                found += clash[at[other]]
-        return found
+                counts += clash[at[other]]
+        return counts
 
 
 def nearest_feasible(mask: Mask, start: Sequence[int]) -> tuple[int, ...]:
@@ -118,14 +118,14 @@ def nearest_feasible(mask: Mask, start: Sequence[int]) -> tuple[int, ...]:
     """
     at = list(start)
     _descend(mask, at)
-    troubled = [s for s in range(len(at)) if mask.forbidden(at, s)[at[s]]]
-    settled: set[int] = set()
-    for sensor in troubled:
-        if sensor not in settled:
+    in_conflict = [s for s in range(len(at)) if mask.forbidden(at, s)[at[s]]]
+    done: set[int] = set()
+    for sensor in in_conflict:
+        if sensor not in done:
             group = _group(mask, sensor)
-            settled.update(group)
+            done.update(group)
             _settle(mask, at, group)
-    return tuple(at) if mask.active is None else mask.active.kept(at)
+    return tuple(at) if mask.active is None else mask.active.within_limit(at)
 
 
 def relaxed(mask: Mask) -> tuple[Mask, tuple[int, ...]]:
@@ -142,7 +142,7 @@ def relaxed(mask: Mask) -> tuple[Mask, tuple[int, ...]]:
     pairs = {pair for pair, table in mask.together.items() if not table[start[pair[0]], start[pair[1]]]}
     mask = _forgiven(mask, courses, pairs)
     if mask.active is not None and mask.active.excess(np.array([start]))[0]:
-        too_many = f"no more than {mask.active.most} sensors were to scan, and too few can be switched off; {_GIVEN}"
+        too_many = f"no more than {mask.active.limit} sensors were to scan, and too few can be switched off; {_GIVEN}"
         mask = replace(mask, active=None, notes=(*mask.notes, too_many))
     return mask, start
 

@@ -86,7 +86,7 @@ def violation_notes(constraints: Sequence[Constraint], situation: ConstraintCont
         notes += [f"sensors {i + 1} and {j + 1}: their courses violate {constraint.name}" for i, j in pairs]
     active = active_of(constraints, situation.courses, situation.scans)
     if active is not None and (excess := int(active.excess(np.zeros((1, len(situation.courses)), np.int64))[0])):
-        notes.append(f"{active.most + excess} sensors scan; expected at most {active.most}")
+        notes.append(f"{active.limit + excess} sensors scan; expected at most {active.limit}")
     return tuple(notes)
 
 
@@ -106,9 +106,9 @@ def _violations(constraint: Constraint, situation: ConstraintContext, answers: S
     for s, own in enumerate(answers):
         fits = s < len(given) and given[s].shape == own.shape
         if not fits or not (np.isfinite(given[s]).all() and ((given[s] > 0.0) == ~own).all()):
-            wanted = f"{len(own)} numbers of sensor {s + 1}, above 0 where a course is not allowed and else 0"
+            expected = f"{len(own)} numbers of sensor {s + 1}, above 0 where a course is not allowed and else 0"
             got = given[s].tolist() if s < len(given) else "none"
-            raise InputError(f"constraint {constraint.name}: expected violations of {wanted}; got {got}")
+            raise InputError(f"constraint {constraint.name}: expected violations of {expected}; got {got}")
     return given
 
 
@@ -135,12 +135,12 @@ def _least_distances(situation: ConstraintContext) -> Floats:
 
     inf: one of them has no courses.
     """
-    ways = [situation.ways(s).reshape(-1, 2) for s in range(len(situation.courses))]
-    centres, radii = np.zeros((len(ways), 2)), np.full(len(ways), -math.inf)
-    for s, own in enumerate(ways):
-        if len(own):
-            centres[s] = (own.min(axis=0) + own.max(axis=0)) / 2.0
-            radii[s] = np.sqrt(((own - centres[s]) ** 2).sum(axis=1).max())
+    paths = [situation.ways(s).reshape(-1, 2) for s in range(len(situation.courses))]
+    centres, radii = np.zeros((len(paths), 2)), np.full(len(paths), -math.inf)
+    for s, path in enumerate(paths):
+        if len(path):
+            centres[s] = (path.min(axis=0) + path.max(axis=0)) / 2.0
+            radii[s] = np.sqrt(((path - centres[s]) ** 2).sum(axis=1).max())
     apart = np.sqrt(((centres[:, np.newaxis] - centres) ** 2).sum(axis=2))
     return np.asarray(apart - radii[:, np.newaxis] - radii)
 

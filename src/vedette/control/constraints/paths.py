@@ -72,10 +72,10 @@ class VisibilityGraph:
             points[goal] = next(near, origin)[0]
         last = clear_lengths(points, self.nodes, self.edges)
         through = self.lengths[:, np.newaxis] + last
-        left = np.hypot(*(goals - points).T)
+        distances = np.hypot(*(goals - points).T)
         if len(self.nodes) == 0:
-            return Paths(self, points, left, np.empty((0, len(points))), np.empty((0, len(points)), np.int64))
-        return Paths(self, points, left, through.min(axis=2), through.argmin(axis=2))
+            return Paths(self, points, distances, np.empty((0, len(points))), np.empty((0, len(points)), np.int64))
+        return Paths(self, points, distances, through.min(axis=2), through.argmin(axis=2))
 
     def is_blocked(self, start: Floats, courses: Floats) -> Bools:
         """Return (num_courses,) whether courses (num_courses, num_times, 2) from `start` (2,) touch a zone.
@@ -118,8 +118,8 @@ class VisibilityGraph:
         from_origin: (num_nodes,) m, path lengths from the origin to the nodes.
         """
         straight = np.isfinite(clear_lengths(origin, points, self.edges)[0])
-        bent = np.isfinite(clear_lengths(points, self.nodes, self.edges) + from_origin).any(axis=1)
-        return np.asarray((straight | bent) & _is_free(self.edges, points))
+        by_corners = np.isfinite(clear_lengths(points, self.nodes, self.edges) + from_origin).any(axis=1)
+        return np.asarray((straight | by_corners) & _is_free(self.edges, points))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -215,9 +215,9 @@ def _near_corners(corners: Floats) -> tuple[Floats, Floats]:
     to, on = np.roll(corners, 1, axis=0) - corners, np.roll(corners, -1, axis=0) - corners
     middle = to / np.hypot(*to.T)[:, np.newaxis] + on / np.hypot(*on.T)[:, np.newaxis]
     size = np.hypot(*middle.T)
-    bent = size > 1e-9
-    step = MARGIN * middle[bent] / size[bent][:, np.newaxis]
-    return corners[bent] - step, corners[bent] + step
+    turning = size > 1e-9
+    step = MARGIN * middle[turning] / size[turning][:, np.newaxis]
+    return corners[turning] - step, corners[turning] + step
 
 
 def _crossings(edges: Edges) -> Floats:

@@ -75,19 +75,19 @@ class Revisit(PerSensorConstraint):
         if speed <= 0.0:
             return []
         places = np.array(self.places)
-        left = self.every - poses[patrols, CLOCKS : CLOCKS + len(places)].min(axis=0)
+        time_left = self.every - poses[patrols, CLOCKS : CLOCKS + len(places)].min(axis=0)
         at, ready = poses[patrols, :2].copy(), np.zeros(len(patrols))
         first: dict[int, int] = {}
         due: set[int] = set()
-        for place in np.argsort(left, kind="stable").tolist():
-            ways = np.hypot(*(at - places[place]).T)
-            arrival = ready + np.maximum(ways - self.radius, 0.0) / speed
-            own = int(np.argmin(arrival))
-            first.setdefault(own, place)
-            if left[place] - arrival[own] <= _HORIZONS * _horizon(situation.times):
-                due.add(own)
-            at[own], ready[own] = places[place], arrival[own]
-        return [(int(patrols[own]), first[own]) for own in sorted(due)]
+        for place in np.argsort(time_left, kind="stable").tolist():
+            distances = np.hypot(*(at - places[place]).T)
+            arrival = ready + np.maximum(distances - self.radius, 0.0) / speed
+            sensor = int(np.argmin(arrival))
+            first.setdefault(sensor, place)
+            if time_left[place] - arrival[sensor] <= _HORIZONS * _horizon(situation.times):
+                due.add(sensor)
+            at[sensor], ready[sensor] = places[place], arrival[sensor]
+        return [(int(patrols[sensor]), first[sensor]) for sensor in sorted(due)]
 
 
 def _horizon(times: Floats) -> float:

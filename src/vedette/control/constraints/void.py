@@ -95,10 +95,10 @@ def _over_hypotheses(belief: FactoredGlmb, outside: Floats) -> Floats:
     if len(filled) == 0:
         return products
     rows = max(1, _BLOCK // len(belief.hyp_tracks))
-    for begun in range(0, len(outside), rows):
-        columns = outside[begun : begun + rows, belief.hyp_tracks]
+    for first in range(0, len(outside), rows):
+        columns = outside[first : first + rows, belief.hyp_tracks]
         terms = np.tile(weights, (len(columns), 1))
         # Between the starts of hypotheses with tracks there are no tracks of other hypotheses.
         terms[:, filled] *= np.multiply.reduceat(columns, belief.hyp_offsets[filled], axis=1)
-        products[begun : begun + rows] = np.add.reduceat(terms, belief.factor_offsets[:-1], axis=1).prod(axis=1)
+        products[first : first + rows] = np.add.reduceat(terms, belief.factor_offsets[:-1], axis=1).prod(axis=1)
     return products

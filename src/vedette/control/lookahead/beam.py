@@ -94,10 +94,10 @@ class BeamSearch:
         scanning: list[Sequence | None],
         beside: list[Sequence | None],
         sensor: int,
-        most: int,
+        max_evaluations: int,
         rng: np.random.Generator,
     ) -> list[Sequence]:
-        """Return the best whole sequences of one sensor found with at most `most` evaluations, the best first.
+        """Return whole sequences of one sensor, the best first, found with at most `max_evaluations` evaluations.
 
         scanning: sequences of the others, None if they do not scan. beside: their sequences for the constraints, and
         the sensor's own if nothing else is found.
@@ -108,22 +108,22 @@ class BeamSearch:
         beam: list[Sequence] = [()]
         for stages_left in reversed(range(problem.depth)):
             longer = ((*taken, k) for taken in beam for k in problem.after(sensor, taken, others))
-            whole = ((taken, own) for taken in longer if (own := problem.kept(sensor, taken, others)) is not None)
-            found = list(itertools.islice(whole, max(0, most)))
-            if not found:
+            whole = ((taken, own) for taken in longer if (own := problem.completed(sensor, taken, others)) is not None)
+            candidates = list(itertools.islice(whole, max(0, max_evaluations)))
+            if not candidates:
                 break
-            values = problem.evaluate([(*ahead, own, *behind) for _, own in found])
-            most -= len(found)
+            values = problem.evaluate([(*ahead, own, *behind) for _, own in candidates])
+            max_evaluations -= len(candidates)
             width = self.beam_width
             if stages_left > 0:
-                width = min(width, max(1, most // (stages_left * num_first)))
-            beam = [found[i][0] for i in _ranked(values, rng)[:width]]
-        kept = (problem.kept(sensor, taken, others) for taken in beam)
-        return [own for own in kept if own is not None] or [own for own in [beside[sensor]] if own is not None]
+                width = min(width, max(1, max_evaluations // (stages_left * num_first)))
+            beam = [candidates[i][0] for i in _ranked(values, rng)[:width]]
+        completed = (problem.completed(sensor, taken, others) for taken in beam)
+        return [own for own in completed if own is not None] or [own for own in [beside[sensor]] if own is not None]
 
 
-def _is_better(value: float, than: float) -> bool:
-    return value > than + tie_tolerance(than) if math.isfinite(than) else value > than
+def _is_better(value: float, reference: float) -> bool:
+    return value > reference + tie_tolerance(reference) if math.isfinite(reference) else value > reference
 
 
 def _ranked(values: list[float], rng: np.random.Generator) -> list[int]:

@@ -101,11 +101,11 @@ class CourseTree:
 
         The pseudo-updates extend to the end of the last decision's horizon.
         """
-        stages, found = self.stages, [(self.options(sequence[:k]), taken) for k, taken in enumerate(sequence)]
-        nums = [stages.stride] * (len(found) - 1) + [stages.steps]
-        parts = list(zip(found, nums, strict=True))
-        poses = np.concatenate([own.courses[taken, :num] for (own, taken), num in parts])
-        return poses, np.concatenate([own.scans[taken, :num] for (own, taken), num in parts])
+        stages, options = self.stages, [(self.options(sequence[:k]), taken) for k, taken in enumerate(sequence)]
+        num_steps = [stages.stride] * (len(options) - 1) + [stages.steps]
+        parts = list(zip(options, num_steps, strict=True))
+        poses = np.concatenate([own.courses[taken, :count] for (own, taken), count in parts])
+        return poses, np.concatenate([own.scans[taken, :count] for (own, taken), count in parts])
 
     def price(self, sequence: Sequence, first: int) -> float:
         """Return the price of a sequence's actions, from decision `first` (from 0) on."""
@@ -113,8 +113,8 @@ class CourseTree:
 
     def rows(self, sequence: Sequence) -> Floats:
         """Return (num_decisions, num_columns) the actions of a sequence."""
-        found = [self.options(sequence[:k]) for k in range(len(sequence))]
-        return np.array([own.actions.values[own.first_action(k)] for own, k in zip(found, sequence, strict=True)])
+        options = [self.options(sequence[:k]) for k in range(len(sequence))]
+        return np.array([own.actions.values[own.first_action(k)] for own, k in zip(options, sequence, strict=True)])
 
     def nearest(self, sequence: Sequence, among: Sequence) -> list[int]:
         """Return courses after those taken so far, ordered by how near their actions are to the last one taken.
@@ -129,7 +129,7 @@ class CourseTree:
         wanted = set(among)
         return [course for course in dict.fromkeys(order.tolist()) if course in wanted]
 
-    def kept(self, sequence: Sequence) -> Sequence:
+    def completed(self, sequence: Sequence) -> Sequence:
         """Return the sequence that repeats the last action, or the nearest one to it, until the end.
 
         If nothing was taken yet it begins with the first action.
@@ -189,13 +189,13 @@ class CourseTree:
                 return 0
             self._blocked[key] = 0  # counted among the visited places from now on
             least_blocked, met = self._open_after(sequence)
-            ways = [(*sequence, course) for course in least_blocked]
+            continuations = [(*sequence, course) for course in least_blocked]
             if len(sequence) + 1 < self.stages.depth:
                 # One way out is enough; ways to visited places come first.
-                ways.sort(key=lambda way: self._moment(way) not in self._open)
+                continuations.sort(key=lambda continuation: self._moment(continuation) not in self._open)
             least = self.stages.depth
-            for way in ways:
-                least = min(least, self._least_blocked(way))
+            for continuation in continuations:
+                least = min(least, self._least_blocked(continuation))
                 if least == 0:
                     break
             self._blocked[key] = least + (not met)

@@ -57,7 +57,7 @@ class FeasibleSequences:
         if not furthest[0]:
             bound = tuple(tree.with_dead_ends() for tree in bound)
             furthest = _furthest(bound, ahead, mask)
-        start = tuple(tree.kept(taken) for tree, taken in zip(bound, furthest, strict=True))
+        start = tuple(tree.completed(taken) for tree, taken in zip(bound, furthest, strict=True))
         return cls(bound, ahead, mask, len(furthest[0]), start)
 
     def first(self) -> Mask:
@@ -69,9 +69,9 @@ class FeasibleSequences:
 
     def allows(self, joint: Several[Sequence | None]) -> bool:
         """Return True if the sequences are allowed together; None: the sensor is not tested."""
-        known = [(s, own) for s, own in enumerate(joint) if own is not None]
-        pairs = combinations(known, 2) if self.ahead.on_pairs else ()
-        if not all(self._alone(*each) for each in known) or not all(
+        tested = [(s, own) for s, own in enumerate(joint) if own is not None]
+        pairs = combinations(tested, 2) if self.ahead.on_pairs else ()
+        if not all(self._alone(*each) for each in tested) or not all(
             self._are_compatible(*one, *two) for one, two in pairs
         ):
             return False
@@ -82,19 +82,19 @@ class FeasibleSequences:
 
         others: for each sensor its courses; those that are None, too short, or the sensor's own are not tested.
         """
-        found, stage = self.trees[sensor].allowed(taken), len(taken) + 1
+        feasible, stage = self.trees[sensor].allowed(taken), len(taken) + 1
         for other, own in enumerate(others):
             if other == sensor or own is None or len(own) < stage:
                 continue
             table = self._table(sensor, taken, other, own[: stage - 1])
             if table is not None:
-                found = tuple(course for course in found if table[course, own[stage - 1]])
+                feasible = tuple(course for course in feasible if table[course, own[stage - 1]])
         beside = [None if s == sensor else own for s, own in enumerate(others)]
         if self._num_active(beside, stage) >= self.most_active:
-            found = tuple(course for course in found if not self._scans(sensor, (*taken, course)))
-        return found
+            feasible = tuple(course for course in feasible if not self._scans(sensor, (*taken, course)))
+        return feasible
 
-    def kept(self, sensor: int, taken: Sequence, others: Several[Sequence | None]) -> Sequence | None:
+    def completed(self, sensor: int, taken: Sequence, others: Several[Sequence | None]) -> Sequence | None:
         """Return the whole feasible sequence that stays nearest to the last action; None: none found.
 
         The nearest course is taken from decision to decision, with backtracking from dead ends.
@@ -123,7 +123,7 @@ class FeasibleSequences:
     @property
     def most_active(self) -> float:
         """Number of sensors that may scan; inf: all."""
-        return math.inf if self.mask.active is None else self.mask.active.most
+        return math.inf if self.mask.active is None else self.mask.active.limit
 
     @property
     def _depth(self) -> int:
@@ -164,10 +164,10 @@ class FeasibleSequences:
             return None if table is None else table.T
         if stage == 1:
             return self.mask.together.get((first, second))
-        mine, its = self.trees[first], self.trees[second]
-        key = (first, second, mine.pose_key(one), its.pose_key(other), self.ahead.moment(stage))
+        first_tree, second_tree = self.trees[first], self.trees[second]
+        key = (first, second, first_tree.pose_key(one), second_tree.pose_key(other), self.ahead.moment(stage))
         if key not in self._tables:
-            places = {first: mine.place(one), second: its.place(other)}
+            places = {first: first_tree.place(one), second: second_tree.place(other)}
             self._tables[key] = self.ahead.pairs(stage, places).get((first, second))
         return self._tables[key]
 

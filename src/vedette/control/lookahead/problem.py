@@ -94,23 +94,23 @@ class PrecomputedCourses:
             self._places[s, taken] = len(self._places)
             courses[s].append(self.trees[s].course(taken))
             self._prices.append(self.trees[s].price(taken, self.first))
-        laid = self.lay_out(tuple(self._options(*own) for own in zip(self.trees, courses, strict=True)))
-        self.counts["filter_steps"] += laid.counts["filter_steps"]
-        assert laid.additive is not None
-        table, cells = laid.additive.table, laid.additive.cells
+        evaluator = self.lay_out(tuple(self._options(*own) for own in zip(self.trees, courses, strict=True)))
+        self.counts["filter_steps"] += evaluator.counts["filter_steps"]
+        assert evaluator.additive is not None
+        table, cells = evaluator.additive.table, evaluator.additive.cells
         changes = table.offsets, table.labels, table.changes
-        found = cells.offsets, cells.cells, cells.log_miss
+        cell_entries = cells.offsets, cells.cells, cells.log_miss
         if self._additive is None:
-            self._additive, self._lists = laid.additive, (_Lists(*changes), _Lists(*found))
+            self._additive, self._lists = evaluator.additive, (_Lists(*changes), _Lists(*cell_entries))
         else:
-            for lists, more in zip(self._lists, (changes, found), strict=True):
+            for lists, more in zip(self._lists, (changes, cell_entries), strict=True):
                 lists.append(*more)
 
     def _options(self, tree: CourseTree, courses: list[tuple[Floats, Bools]]) -> Options:
-        num, steps = len(courses), tree.stages.num_steps(self.stage)
-        poses = np.array([own for own, _ in courses]).reshape(num, steps, len(tree.pose))
-        scans = np.array([own for _, own in courses], np.bool_).reshape(num, steps)
-        return Options(tree.options(()).actions, poses, np.arange(num), tree.pose, np.zeros(num), scans)
+        num_courses, steps = len(courses), tree.stages.num_steps(self.stage)
+        poses = np.array([own for own, _ in courses]).reshape(num_courses, steps, len(tree.pose))
+        scans = np.array([own for _, own in courses], np.bool_).reshape(num_courses, steps)
+        return Options(tree.options(()).actions, poses, np.arange(num_courses), tree.pose, np.zeros(num_courses), scans)
 
     def _rewards(self) -> AdditiveRewards:
         """Return the rewards of all courses so far; each sensor may index any of them, and is given its own."""
@@ -177,12 +177,14 @@ class SequenceProblem:
             return self.trees[sensor].allowed(taken)
         return self.rules.after(sensor, taken, others)
 
-    def kept(self, sensor: int, taken: Sequence, others: Taken) -> Sequence | None:
+    def completed(self, sensor: int, taken: Sequence, others: Taken) -> Sequence | None:
         """Return the whole sequence of one sensor that repeats its last action, or the nearest one that is feasible.
 
         others: sequences of the other sensors. None: no such sequence was found.
         """
-        return self.trees[sensor].kept(taken) if self.rules is None else self.rules.kept(sensor, taken, others)
+        return (
+            self.trees[sensor].completed(taken) if self.rules is None else self.rules.completed(sensor, taken, others)
+        )
 
     def evaluate(self, joints: Iterable[Taken]) -> list[float]:
         """Return values of joint sequences, none evaluated twice; -inf for those beyond the budget.
@@ -230,7 +232,7 @@ class SequenceProblem:
         """Evaluate a first joint sequence: all sensors repeat a joint action; or another that is allowed."""
         joint: Taken = tuple((course,) for course in choice)
         for s, own in enumerate(joint):
-            whole = None if own is None else self.kept(s, own, joint)
+            whole = None if own is None else self.completed(s, own, joint)
             joint = (*joint[:s], whole, *joint[s + 1 :])
         if None not in joint:
             self.evaluate([joint])
@@ -251,8 +253,8 @@ class SequenceProblem:
 
     def curve(self) -> SearchCurve:
         """Return the progress of the search, from the first whole joint sequence on."""
-        known = np.array(self._best) > -math.inf
-        return SearchCurve(np.array(self._evaluations, np.int64)[known], np.array(self._best)[known])
+        has_best = np.array(self._best) > -math.inf
+        return SearchCurve(np.array(self._evaluations, np.int64)[has_best], np.array(self._best)[has_best])
 
 
 def printed_order(sequence: JointSequence) -> tuple[int, ...]:

@@ -146,12 +146,12 @@ class _Climb:
     def _rolled_out(self, sensor: int, joint: JointSequence) -> Sequence | None:
         problem, taken = self.problem, joint[sensor]
         if self.search.rollout == "repeat_last" and taken:
-            return problem.kept(sensor, taken, joint)
+            return problem.completed(sensor, taken, joint)
         while len(taken) < problem.depth:
             allowed = problem.after(sensor, taken, joint)
             if not allowed:  # a random choice led to a dead end
-                return problem.kept(sensor, joint[sensor], joint)
+                return problem.completed(sensor, joint[sensor], joint)
             taken = (*taken, allowed[int(self.rng.integers(len(allowed)))])
             if self.search.rollout == "repeat_last":
-                return problem.kept(sensor, taken, joint)
+                return problem.completed(sensor, taken, joint)
         return taken

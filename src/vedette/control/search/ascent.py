@@ -46,63 +46,63 @@ class CoordinateAscent(Checked):
 
     def search(self, problem: JointProblem, *, rng: np.random.Generator) -> tuple[int, ...]:
         """Return the best result of all ascents; of equal ones that were evaluated the first in printed order."""
-        known = RewardCache(problem)
-        ascents(known, first_starts(known, self.num_restarts, rng=rng))
-        return known.best()
+        cache = RewardCache(problem)
+        ascents(cache, first_starts(cache, self.num_restarts, rng=rng))
+        return cache.best()
 
 
-def first_starts(known: RewardCache, num_restarts: int, *, rng: np.random.Generator) -> list[Joint]:
+def first_starts(cache: RewardCache, num_restarts: int, *, rng: np.random.Generator) -> list[Joint]:
     """Return the independent decision, and joint actions drawn at random."""
-    return [known.allowed(known.problem.independent()), *known.drawn(num_restarts, rng=rng)]
+    return [cache.allowed(cache.problem.independent()), *cache.drawn(num_restarts, rng=rng)]
 
 
-def ascents(known: RewardCache, starts: Sequence[Joint]) -> list[Joint]:
+def ascents(cache: RewardCache, starts: Sequence[Joint]) -> list[Joint]:
     """Return the results of ascents; they and the first start are then in the cache.
 
     If only some sensors may scan, exchanges of two and ascents continue from the best result until none improves it.
     """
     ends = list[Joint]()
     for start in starts:
-        if ends and known.is_late():
+        if ends and cache.is_late():
             break
-        ends.append(_climbed(known, start))
-    known.rewards([starts[0], *ends])
-    if known.mask is not None and known.mask.active is not None:
-        best: Joint | None = max(ends, key=known.values.__getitem__)
-        while best is not None and not known.is_late():
-            ends.append(_climbed(known, best))
-            known.rewards(ends[-1:])
-            best = _exchanged(known, ends[-1], known.mask.active)
+        ends.append(_climbed(cache, start))
+    cache.rewards([starts[0], *ends])
+    if cache.mask is not None and cache.mask.active is not None:
+        best: Joint | None = max(ends, key=cache.values.__getitem__)
+        while best is not None and not cache.is_late():
+            ends.append(_climbed(cache, best))
+            cache.rewards(ends[-1:])
+            best = _exchanged(cache, ends[-1], cache.mask.active)
     return ends
 
 
-def _climbed(known: RewardCache, start: Joint) -> Joint:
+def _climbed(cache: RewardCache, start: Joint) -> Joint:
     """Return the result of an ascent."""
-    climb = known.problem.ascend
-    return _ascend(known, start) if climb is None else known.allowed(climb(start))
+    climb = cache.problem.ascend
+    return _ascend(cache, start) if climb is None else cache.allowed(climb(start))
 
 
-def _exchanged(known: RewardCache, at: Joint, active: Active) -> Joint | None:
+def _exchanged(cache: RewardCache, start: Joint, active: Active) -> Joint | None:
     """Return the best joint action in which another sensor scans instead of one; None: no exchange improves it."""
-    found, value = [at], known.values.__getitem__
-    for s, course in enumerate(at):
-        silent = [joint for joint in known.line(at, s) if not active.on[s][joint[s]]]
+    candidates, value = [start], cache.values.__getitem__
+    for s, course in enumerate(start):
+        silent = [joint for joint in cache.line(start, s) if not active.on[s][joint[s]]]
         if not active.on[s][course] or not silent:
             continue
         without = max(silent, key=value)
-        for other in range(len(at)):
-            if other != s and not active.on[other][at[other]]:
-                found += known.line(without, other)
-    best = max(found, key=value)
-    return best if value(best) > value(at) + tie_tolerance(value(at)) else None
+        for other in range(len(start)):
+            if other != s and not active.on[other][start[other]]:
+                candidates += cache.line(without, other)
+    best = max(candidates, key=value)
+    return best if value(best) > value(start) + tie_tolerance(value(start)) else None
 
 
-def _ascend(known: RewardCache, start: Joint) -> Joint:
+def _ascend(cache: RewardCache, start: Joint) -> Joint:
     """Return the result of one ascent. On each line the first exact maximum is taken, so that no ascent cycles."""
     at, settled, sensor, num_sensors = start, 0, 0, len(start)
     while settled < num_sensors:
-        line = known.line(at, sensor)
-        best = max(line, key=known.values.__getitem__)
+        line = cache.line(at, sensor)
+        best = max(line, key=cache.values.__getitem__)
         settled = settled + 1 if best == at else 1
         at, sensor = best, (sensor + 1) % num_sensors
     return at
@@ -129,14 +129,14 @@ class AutomaticSearch(Checked):
         """Return the result of the search that it selects."""
         if len(problem.shape) <= _MAX_SENSORS and math.prod(problem.shape) <= self.max_joint_actions:
             return best_of_all(problem, self.max_joint_actions)
-        known = RewardCache(problem)
-        ascents(known, first_starts(known, _NUM_RESTARTS, rng=rng))
+        cache = RewardCache(problem)
+        ascents(cache, first_starts(cache, _NUM_RESTARTS, rng=rng))
         more = _FIRST_TRIES // sum(problem.shape) - _NUM_RESTARTS
-        if known.is_late():
-            return known.best()
-        if more > 0 and problem.bound is not None and _may_be_far(max(known.values.values()), problem.bound()):
-            ascents(known, known.drawn(more, rng=rng))
-        return known.best()
+        if cache.is_late():
+            return cache.best()
+        if more > 0 and problem.bound is not None and _may_be_far(max(cache.values.values()), problem.bound()):
+            ascents(cache, cache.drawn(more, rng=rng))
+        return cache.best()
 
 
 def _may_be_far(best: float, upper: float) -> bool:

@@ -46,30 +46,30 @@ class CrossEntropy(Checked):
 
     def search(self, problem: JointProblem, *, rng: np.random.Generator) -> tuple[int, ...]:
         """Return the best joint action drawn; of equal ones the first in printed order."""
-        known = RewardCache(problem)
-        probabilities = _uniform(known)
+        cache = RewardCache(problem)
+        probabilities = _uniform(cache)
         num_elite = math.ceil(self.elite_fraction * self.num_samples)
-        drawn = [known.allowed(problem.independent())]
+        drawn = [cache.allowed(problem.independent())]
         for _ in range(self.max_rounds):
-            drawn += known.all_allowed(_draw(known.mask, probabilities, self.num_samples, rng))
-            num_known = len(known.values)
-            order = np.argsort(-known.rewards(drawn), kind="stable")
+            drawn += cache.all_allowed(_draw(cache.mask, probabilities, self.num_samples, rng))
+            num_known = len(cache.values)
+            order = np.argsort(-cache.rewards(drawn), kind="stable")
             elite = np.array([drawn[i] for i in order[:num_elite].tolist()])
             shares = (elite[:, :, np.newaxis] == np.arange(probabilities.shape[1])).mean(axis=0)
             probabilities += self.smoothing * (shares - probabilities)
-            is_settled = len(known.values) == num_known or (probabilities.max(axis=1) >= _DEGENERATE).all()
-            if is_settled or known.is_late():
+            is_settled = len(cache.values) == num_known or (probabilities.max(axis=1) >= _DEGENERATE).all()
+            if is_settled or cache.is_late():
                 break
             drawn = []
-        return known.best()
+        return cache.best()
 
 
-def _uniform(known: RewardCache) -> Floats:
+def _uniform(cache: RewardCache) -> Floats:
     """Return (num_sensors, most courses) equal probabilities for all feasible courses of a sensor; 0 elsewhere."""
-    shape = known.problem.shape
+    shape = cache.problem.shape
     probabilities = np.zeros((len(shape), max(shape)))
     for s in range(len(shape)):
-        probabilities[s, known.actions([-1] * len(shape), s)] = 1.0
+        probabilities[s, cache.actions([-1] * len(shape), s)] = 1.0
     return np.asarray(probabilities / probabilities.sum(axis=1, keepdims=True))
 
 

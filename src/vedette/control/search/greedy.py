@@ -46,27 +46,27 @@ class SequentialGreedy(Checked):
         if problem.partial is None:
             expected = "rewards of sensors that have not decided (JointProblem.partial), for SequentialGreedy"
             raise InputError(f"search: expected {expected}; got none; search by CoordinateAscent")
-        known = RewardCache(problem)
-        steps = _Steps(known, problem.partial)
+        cache = RewardCache(problem)
+        steps = _Steps(cache, problem.partial)
         if self.order == "sensor_order":
             for sensor in range(len(problem.shape)):
                 steps.take(sensor, steps.best(sensor))
         else:
             _best_first(steps)
-        return known.allowed(steps.completed())
+        return cache.allowed(steps.completed())
 
 
 class _Steps:
     """The decided sensors' actions with their reward; -1: not decided."""
 
-    def __init__(self, known: RewardCache, partial: Callable[[Ints], Floats]) -> None:
-        self.known, self.partial = known, partial
-        self.at: list[int] = [-1] * len(known.problem.shape)
+    def __init__(self, cache: RewardCache, partial: Callable[[Ints], Floats]) -> None:
+        self.cache, self.partial = cache, partial
+        self.at: list[int] = [-1] * len(cache.problem.shape)
         self.reward = 0.0
 
     def best(self, sensor: int) -> tuple[float, int] | None:
         """Return the largest reward with one more sensor, and its action; None if it has no feasible action."""
-        actions = self.known.actions(self.at, sensor)
+        actions = self.cache.actions(self.at, sensor)
         if not actions:
             return None
         rows = np.tile(np.array(self.at, np.int64), (len(actions), 1))

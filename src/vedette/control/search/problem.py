@@ -190,20 +190,20 @@ def best_of_all(problem: JointProblem, max_actions: int) -> Joint:
 
 def _allowed(mask: Mask, max_actions: int) -> Ints:
     """Return (num_allowed, num_sensors) in printed order, formed sensor by sensor from compatible courses."""
-    found = np.empty((1, 0), np.int64)
+    joint_actions = np.empty((1, 0), np.int64)
     for s, own in enumerate(mask.single):
         courses = np.flatnonzero(own)
-        ahead = np.repeat(found, len(courses), axis=0)
-        found = np.column_stack([ahead, np.tile(courses, len(found))])
+        ahead = np.repeat(joint_actions, len(courses), axis=0)
+        joint_actions = np.column_stack([ahead, np.tile(courses, len(joint_actions))])
         for other, clash in mask.others(s).items():
             if other < s:
-                found = found[clash[found[:, other], found[:, s]] == 0]
+                joint_actions = joint_actions[clash[joint_actions[:, other], joint_actions[:, s]] == 0]
         if mask.active is not None:
-            scanning = sum(on[found[:, i]].astype(np.int64) for i, on in enumerate(mask.active.on[: s + 1]))
-            found = found[scanning <= mask.active.most]
-        if len(found) > max_actions:
+            scanning = sum(on[joint_actions[:, i]].astype(np.int64) for i, on in enumerate(mask.active.on[: s + 1]))
+            joint_actions = joint_actions[scanning <= mask.active.limit]
+        if len(joint_actions) > max_actions:
             raise _too_many(max_actions, f"more than that, of {s + 1} of {len(mask.single)} sensors")
-    return np.ascontiguousarray(found)
+    return np.ascontiguousarray(joint_actions)
 
 
 def _too_many(max_actions: int, got: str) -> InputError:

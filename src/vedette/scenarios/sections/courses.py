@@ -79,8 +79,8 @@ def sensor_as_courses(data: Mapping[str, Any], sensor: Sensor, compass: Compass)
 def _platform_as_courses(data: Mapping[str, Any], platform: Section, compass: Compass, place: Any) -> dict[str, Any]:
     courses = directions_as_courses(platform, compass, place)
     converted = dict(courses.get(key, (key, value)) for key, value in data.items())
-    if isinstance(carrier := getattr(platform, "platform", None), Section):
-        converted["platform"] = _platform_as_courses(data["platform"], carrier, compass, place)
+    if isinstance(mounting := getattr(platform, "platform", None), Section):
+        converted["platform"] = _platform_as_courses(data["platform"], mounting, compass, place)
     return converted
 
 
@@ -110,7 +110,7 @@ def _heading_keys(key: str) -> Collection[str]:
 
 
 def _keys(part: Mapping[str, Any]) -> Iterator[str]:
-    """Yield the keys of a sensor, its platform and that platform's carrier."""
+    """Yield the keys of a sensor, its platform and the platform that carries that one."""
     platform = part.get("platform")
     for section in (part, platform, platform.get("platform") if _is_mapping(platform) else None):
         if _is_mapping(section):

@@ -120,12 +120,12 @@ class CustomPlatform(_PlatformSection, Custom):
         return math.inf
 
 
-Carrier = Annotated[Stationary | Heading | GridMoves | Waypoints | CustomPlatform, Field(discriminator="kind")]
+MountingPlatform = Annotated[Stationary | Heading | GridMoves | Waypoints | CustomPlatform, Field(discriminator="kind")]
 
 
 @derived("vedette.platforms.camera:Pointing", first=("pointing_deg", "half_width_deg"))
 class Camera(_PlatformSection):
-    """Is pointed, and may zoom, on the spot or on what carries it; an action is a pointing, and what the carrier does.
+    """Points and may zoom, at rest or on a platform; an action is a pointing, and an action of that platform.
 
     Detection of kind `camera` looks along the pointing.
     """
@@ -134,10 +134,10 @@ class Camera(_PlatformSection):
     pointing_deg: float = Field(default=0.0, description="Where it points at the start, as a heading [deg].")
     half_width_deg: HalfWidth = Field(description="Half the width of its field of view at the start [deg].")
     half_widths_deg: Annotated[tuple[HalfWidth, ...], Field(strict=False)]
-    platform: Carrier = Field(default=Stationary(), description="What carries it [-].")
+    platform: MountingPlatform = Field(default=Stationary(), description="Platform that carries it [-].")
 
     def build(self, folder: Path | None = None, **_: Any) -> Platform:
-        """Return a camera, with its carrier if that moves."""
+        """Return a camera, on its platform if that moves."""
         from vedette.platforms import MountedPlatform
 
         pointing: Platform = super().build(folder)
