@@ -62,7 +62,7 @@ class RandomPlanner:
 
     def __post_init__(self) -> None:
         check_control_inputs(self)
-        needing_beliefs = [own.name for own in self.constraints if own.needs_beliefs]
+        needing_beliefs = [constraint.name for constraint in self.constraints if constraint.needs_beliefs]
         if needing_beliefs and not all(has_labels(sensor.filter) for sensor in self.sensors):
             raise reject(
                 "constraints", "none that asks where targets will be, as filters have no labels", needing_beliefs[0]

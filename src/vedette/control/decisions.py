@@ -111,7 +111,7 @@ class Rounds:
     def _rewards(self, open_races: Sequence[Race], num_samples: int) -> list[Floats]:
         """Return for each race rewards (num_left, num_samples) of its remaining courses on newly drawn samples."""
         options = self.preparation.options
-        courses_of = [_wanted(open_races, s) for s in range(len(options))]
+        courses_of = [_courses_in_races(open_races, s) for s in range(len(options))]
         others = None
         if self.others is not None:
             courses_of = [np.union1d(own, [other]) for own, other in zip(courses_of, self.others, strict=True)]
@@ -262,7 +262,7 @@ def combine_parts(
     )
 
 
-def _wanted(open_races: Sequence[Race], sensor: int) -> Ints:
+def _courses_in_races(open_races: Sequence[Race], sensor: int) -> Ints:
     """Return the courses of a sensor that some candidate takes; one course, if no race needs any."""
     races = [race for race in open_races if race.sensor in (None, sensor)]
     columns = [race.candidates[:, sensor if race.sensor is None else 0] for race in races]

@@ -132,8 +132,8 @@ def _joint(program: Program, answer: dict[str, Any], options: Sequence[Options],
     if mask is not None:
         for (first, second), table in mask.together.items():
             if not table[given[first], given[second]]:
-                wanted = f"actions[{first}] and actions[{second}] that are allowed together"
-                program.refuse(wanted, f"{given[first]} and {given[second]}")
+                expected = f"actions[{first}] and actions[{second}] that are allowed together"
+                program.refuse(expected, f"{given[first]} and {given[second]}")
         if mask.active is not None and (excess := int(mask.active.excess(np.array([given]))[0])):
             program.refuse(f"actions with at most {mask.active.limit} sensors on", f"{mask.active.limit + excess} on")
     return tuple(given)

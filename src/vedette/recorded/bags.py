@@ -59,9 +59,9 @@ def _messages(file: Path, kinds: tuple[str, ...]) -> Any:
 
     # All distributions define these messages equally; definitions in the bag take precedence.
     with AnyReader([file], default_typestore=get_typestore(Stores.ROS2_HUMBLE)) as reader:
-        wanted = [connection for connection in reader.connections if connection.msgtype in kinds]
-        if wanted:
-            for connection, _, raw in reader.messages(connections=wanted):
+        connections = [connection for connection in reader.connections if connection.msgtype in kinds]
+        if connections:
+            for connection, _, raw in reader.messages(connections=connections):
                 yield connection.topic, reader.deserialize(raw, connection.msgtype)
 
 

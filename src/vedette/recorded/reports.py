@@ -135,9 +135,9 @@ def _altitudes(table: Table, given: Mapping[str, str]) -> Floats | None:
 def usual_names(columns: Iterable[str]) -> dict[str, str]:
     """Return columns under other usual names; places in degrees only if there are none in metres."""
     have = set(columns)
-    wanted = ("time", "id") if {"x", "y"} <= have else ("time", "id", "longitude", "latitude")
+    quantities = ("time", "id") if {"x", "y"} <= have else ("time", "id", "longitude", "latitude")
     columns_of = {}
-    for quantity in wanted:
+    for quantity in quantities:
         others = [name for name in OTHER_NAMES[quantity] if name in have]
         if quantity not in have and others:
             columns_of[quantity] = others[0]

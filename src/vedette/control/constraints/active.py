@@ -99,10 +99,10 @@ def active_of(constraints: Sequence[Constraint], courses: Sequence[Floats], scan
 
     courses: (num_courses, num_times, pose_dim) for each sensor. scans: (num_courses, num_times) whether they scan.
     """
-    numbers = [own.most_active for own in constraints if provides(own, ActivationConstraint)]
+    numbers = [constraint.most_active for constraint in constraints if provides(constraint, ActivationConstraint)]
     if not numbers or not scans:
         return None
-    on = tuple(np.asarray(own.any(axis=1)) for own in scans)
+    on = tuple(np.asarray(sensor_scans.any(axis=1)) for sensor_scans in scans)
     return Active(on, tuple(map(_twins, courses, on)), min(numbers))
 
 

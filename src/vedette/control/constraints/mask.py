@@ -51,9 +51,9 @@ class Mask:
         for (first, second), table in self.together.items():
             if not 0 <= first < second < len(shape):
                 raise InputError(f"mask: expected pairs of sensors below {len(shape)}; got {first, second}")
-            wanted = (shape[first], shape[second])
-            if table.shape != wanted:
-                raise InputError(f"mask of sensors {first, second}: expected shape {wanted}; got {table.shape}")
+            expected_shape = (shape[first], shape[second])
+            if table.shape != expected_shape:
+                raise InputError(f"mask of sensors {first, second}: expected shape {expected_shape}; got {table.shape}")
             clash = np.asarray(~table, np.int64)
             # One row per course of the other sensor, so that a look-up reads one contiguous row.
             conflicts[first][second] = np.ascontiguousarray(clash.T)

@@ -35,8 +35,8 @@ def feasible_action_mask(constraints: Sequence[Constraint], situation: Constrain
     """
     for constraint in constraints:
         if constraint.needs_beliefs and len(situation.beliefs) != len(situation.times):
-            wanted = f"{len(situation.times)} predicted beliefs, one a time"
-            raise InputError(f"constraint {constraint.name}: expected {wanted}; got {len(situation.beliefs)}")
+            expected = f"{len(situation.times)} predicted beliefs, one a time"
+            raise InputError(f"constraint {constraint.name}: expected {expected}; got {len(situation.beliefs)}")
     single, blocked = courses_allowed(constraints, situation)
     notes = tuple(f"sensor {s + 1}: {infeasible_note(constraints)}" for s in blocked)
     active = active_of(constraints, situation.courses, situation.scans)

@@ -175,7 +175,7 @@ def visibility_graph(constraints: Sequence[Constraint]) -> VisibilityGraph | Non
 
     The graph of the same zones is built once and shared by all decisions, planners and runs.
     """
-    zones = [own.zone for own in constraints if provides(own, ZoneConstraint)]
+    zones = [constraint.zone for constraint in constraints if provides(constraint, ZoneConstraint)]
     return _built(tuple(tuple(ring.tobytes() for ring in rings) for rings in zones)) if zones else None
 
 

@@ -54,8 +54,10 @@ class Revisit(PerSensorConstraint):
         if poses is None:
             return tuple(violations)
         if poses.shape[1] < CLOCKS + len(self.places):
-            wanted = f"poses of {CLOCKS + len(self.places)} components, the last of them seconds since the last visits"
-            raise InputError(f"constraint {self.name}: expected {wanted} (see Patrolling); got {poses.shape[1]}")
+            expected = (
+                f"poses of {CLOCKS + len(self.places)} components, the last of them seconds since the last visits"
+            )
+            raise InputError(f"constraint {self.name}: expected {expected} (see Patrolling); got {poses.shape[1]}")
         for sensor, place in self._sent(situation, poses):
             gaps = _gaps(situation.ways(sensor), np.array(self.places[place])) - self.radius
             if len(gaps):

@@ -80,7 +80,8 @@ class MultiStepConstraints:
     def __post_init__(self) -> None:
         self.on_pairs = max(map(interaction_range_of, self.constraints)) > 0.0
         self._time_invariant = all(
-            isinstance(own, TimeInvariantConstraint) and own.time_invariant for own in self.constraints
+            isinstance(constraint, TimeInvariantConstraint) and constraint.time_invariant
+            for constraint in self.constraints
         )
 
     def mask(self, places: Mapping[int, Place]) -> Mask:

@@ -152,7 +152,7 @@ class HorizonPlanner:
 
     def _given(self, state: State, poses: Floats, planned: PlanningBeliefs) -> _Given:
         at, stages = check_poses(poses, len(self.sensors)), self._stages(state)
-        trees = tuple(CourseTree(s, own.platform, at[s], stages) for s, own in enumerate(self.sensors))
+        trees = tuple(CourseTree(s, sensor.platform, at[s], stages) for s, sensor in enumerate(self.sensors))
         if not self.constraints:
             return _Given(stages, trees, None, planned)
         at = np.array([tree.pose for tree in trees])

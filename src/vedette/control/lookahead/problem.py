@@ -78,9 +78,9 @@ class PrecomputedCourses:
 
     def __call__(self, joints: list[Taken]) -> Floats:
         """Return rewards (num, num_samples) of joint actions."""
-        wanted = {(s, taken) for joint in joints for s, taken in enumerate(joint) if taken is not None}
+        requested = {(s, taken) for joint in joints for s, taken in enumerate(joint) if taken is not None}
         # Sensor by sensor, as they are precomputed.
-        new = sorted(wanted - self._places.keys())
+        new = sorted(requested - self._places.keys())
         if new or self._additive is None:
             self._add(new)
         actions = [[-1 if own is None else self._places[s, own] for s, own in enumerate(joint)] for joint in joints]
@@ -192,8 +192,8 @@ class SequenceProblem:
         A sensor without a sequence (None) does not scan. The value is -inf if it is not finite, and for sequences that
         constraints forbid, which are not evaluated.
         """
-        wanted = list(joints)
-        unknown = [joint for joint in dict.fromkeys(wanted) if joint not in self._values]
+        requested = list(joints)
+        unknown = [joint for joint in dict.fromkeys(requested) if joint not in self._values]
         new = list(itertools.islice(filter(self.allows, unknown), self.left))
         if new:
             rewards = self._rewards(new)
@@ -201,7 +201,7 @@ class SequenceProblem:
             values[~np.isfinite(values)] = -math.inf
             self._values.update(zip(new, values.tolist(), strict=True))
             self._keep(new, rewards, values)
-        return [self._values.get(joint, -math.inf) for joint in wanted]
+        return [self._values.get(joint, -math.inf) for joint in requested]
 
     def _rewards(self, joints: list[Taken]) -> Floats:
         total: Floats | float = 0.0
