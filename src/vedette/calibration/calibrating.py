@@ -15,6 +15,7 @@ from vedette.calibration.parameters import Parameter, Problem
 from vedette.calibration.registration import (
     BIASES,
     MatchedMeasurements,
+    is_one_place,
     match_measurements,
     register,
     sensors_with_common_targets,
@@ -25,6 +26,11 @@ from vedette.kernels.base.types import Floats
 _NEARER = 3.0  # multiple of the estimated noise, in the next round
 _QUANTILE = 1.959964  # of the normal distribution, 97.5 %
 _COMPARED = ("clock", "x", "y")  # components that are relative to those of the first sensor
+_BY_MOTION = {  # biases of a sensor without another one at another place, and what a bias then is like
+    "bearing": "a rotation of all targets",
+    "range": "another motion of the targets than assumed",
+}
+_NO_SHARED = "no other sensor observes enough of the same targets"
 _SHORT = 1.0  # log likelihood by which a search with fixed parameters may exceed the full search
 _PART = 0.1  # share of a parameter in undetermined directions above which it is not identifiable
 
@@ -88,16 +94,22 @@ def calibrate(
 
     before = float(terms(said[asked], asked).sum())
     guessed, pairs = _guess(problem, said, asked, progress)
-    start = guessed if float(terms(guessed[asked], asked).sum()) > before else said.copy()
     together = sensors_with_common_targets(pairs, len(problem.sites))
     apart = np.flatnonzero(~together | (together.sum() == 1)).tolist()  # without linked sensors the first is apart, too
-    found, directions, own = dict[int, ParameterEstimate](), list[int](), asked
+    held = {i: _unknown(problem, i) for i in asked if i in _biases_by_motion(problem, pairs, apart)}
+    free = [i for i in asked if i not in held]
+    if not free:
+        return Calibration(tuple(held[i] for i in asked), before, before, True, 0)
+    if held:
+        guessed, pairs = _guess(problem, said, free, progress)
+    start = guessed if float(terms(guessed[free], free).sum()) > before else said.copy()
+    found, directions, own = held, list[int](), free
     highest, again = math.inf, False
     while True:
         maximum, judged, rank = _found(problem, own, partial(terms, own=own), start[own], apart)
         if not again and maximum.log_likelihood > highest + _SHORT:
             # Higher with fixed parameters: the full search stopped short of its maximum; restart it from here, once.
-            start[own], own, again = maximum.at, asked, True
+            start[own], own, again = maximum.at, free, True
             directions.clear()
             continue
         highest = maximum.log_likelihood
@@ -115,6 +127,36 @@ def calibrate(
     if not maximum.converged:  # second derivatives away from a maximum are not the information
         kept = tuple(each._replace(ci_low=math.nan, ci_high=math.nan) for each in kept)
     return Calibration(kept, log_likelihood, before, maximum.converged, directions[0])
+
+
+def _biases_by_motion(problem: Problem, pairs: MatchedMeasurements, apart: Sequence[int]) -> list[int]:
+    """Return the biases of bearings and ranges that would follow from the assumed motion of the targets alone.
+
+    They are those of a sensor that shares no targets with a sensor at another place. Of several sensors at one place
+    they are those of the first, which the others are compared with. A sensor that measures positions suffices anywhere.
+    """
+    kinds = [COMPONENTS[site.kind] for site in problem.sites]
+    groups = [*([s] for s in apart), [s for s in range(len(kinds)) if s not in apart]]
+    found = list[int]()
+    for group in groups:
+        if any("x" in kinds[s] for s in group) or not is_one_place(pairs, group):
+            continue
+        for name in _BY_MOTION:
+            first = next((s for s in group if name in kinds[s]), None)
+            found += [
+                i
+                for i, each in enumerate(problem.parameters)
+                if (each.sensor, each.kind, each.component) == (first, "bias", name)
+            ]
+    return found
+
+
+def _unknown(problem: Problem, i: int) -> ParameterEstimate:
+    """Return a bias that would follow from the assumed motion alone, as not identifiable."""
+    own, alone = problem.parameters[i], len(problem.sites) == 1
+    lacking = "there is no other sensor" if alone else f"{_NO_SHARED} from another place"
+    reason = f"not identifiable: {lacking} to separate it from {_BY_MOTION[own.component]}"
+    return ParameterEstimate(own, own.start, math.nan, math.nan, reason)
 
 
 def _found(
@@ -232,7 +274,7 @@ def _why(problem: Problem, i: int, partners: list[int], is_apart: bool) -> str:
         return "not identifiable: the recording contains almost no information about this parameter"
     if alone or is_apart:
         what = {"bearing": "a rotation", "clock": "a shift in time"}.get(own.component, "a shift")
-        lacking = "there is no other sensor" if alone else "no other sensor observes enough of the same targets"
+        lacking = "there is no other sensor" if alone else _NO_SHARED
         beside = f" (with {', '.join(names)})" if names else ""
         return f"not identifiable: {lacking} to separate it{beside} from {what} of all targets"
     if names:

@@ -30,6 +30,7 @@ _SCANS_A_PIECE = 5  # scans of the slowest sensor per piece
 _LEAST_PAIRS = 4  # least number of pairs in a piece
 _LEAST_SEEN = 3  # least number of measurements of a target for a sensor to share it with others
 _MAD = 1.4826  # standard deviation of Gaussian numbers over their median absolute value
+_BASELINE = 0.03  # distance between sensors, as a share of that of the targets, below which they are at one place
 _POSITION, _SPEED = 1e4, 30.0  # m, m/s: prior that regularises poorly determined pieces
 
 
@@ -133,6 +134,22 @@ def sensors_with_common_targets(pairs: MatchedMeasurements, num_sensors: int) ->
     for _ in range(num_sensors):
         reached = np.logical_or(reached, seen[:, seen[reached].any(axis=0)].any(axis=1))
     return reached
+
+
+def is_one_place(pairs: MatchedMeasurements, sensors: Sequence[int]) -> bool:
+    """Return True if these sensors measured from one place, or from places on one straight course at constant velocity.
+
+    Only the assumed motion of the targets then tells a constant error of their ranges from none: seen from another
+    frame of reference, a sensor on such a course is at rest.
+    """
+    own = np.isin(pairs.sensors, sensors)
+    if not own.any():
+        return True
+    times, places = pairs.times[own], pairs.poses[own]
+    course = np.column_stack([np.ones(len(times)), times - times.mean()])
+    away = places - course @ np.linalg.lstsq(course, places)[0]
+    distances = np.hypot(*(pairs.states[own, :2] - places).T)
+    return bool(2.0 * np.sqrt((away**2).sum(axis=1).mean()) < _BASELINE * np.median(distances))
 
 
 class Registration(NamedTuple):

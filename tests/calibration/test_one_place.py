@@ -1,0 +1,123 @@
+"""Biases that only the assumed motion of targets could tell: of radars at one place."""
+
+from __future__ import annotations
+
+import csv
+import math
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from vedette.calibration import Calibration, ParameterEstimate, calibrate
+from vedette.calibration.registration import MatchedMeasurements, is_one_place
+from vedette.kernels.base.types import Floats
+from vedette.scenarios.calibration import build_problem
+from vedette.scenarios.from_recording import scenario_from_recording
+
+SHIPS = np.array([[-2500.0, 1500.0, 7.0, -2.0], [1800.0, 2600.0, -4.0, -6.0], [-800.0, -2200.0, 3.0, 8.0]])
+TEXT = """recording: {bearings: east}
+motion: {kind: constant_velocity, sigma_v: 0.05, noise_model: continuous_white}
+sensor_defaults:
+  measurement: {kind: bearing_range}
+  noise: {kind: range_dependent, sigma_range: 25.0, eta_range: 0.0, sigma_bearing_deg: 0.9, eta_bearing: 0.0}
+  detection: {kind: constant, probability: 0.8}
+  clutter: {kind: region, rate: 2.0}
+sensors:
+"""
+Course = Callable[[float], Floats]
+
+
+def at(x: float, y: float) -> Course:
+    return lambda time: np.array([x, y])
+
+
+def straight(time: float) -> Floats:
+    return np.array([40.0 * time - 4000.0, 500.0 - 30.0 * time])
+
+
+def weaving(time: float) -> Floats:
+    return np.array([6.0 * time - 600.0, 400.0 * math.sin(time / 20.0)])
+
+
+def calibration_of(
+    folder: Path, courses: Sequence[Course], biases: Sequence[tuple[float, float]], kinds: Sequence[str] = ("bias",)
+) -> Calibration:
+    """Of radars with biases in range, m, and bearing, deg, over 200 s of straight ships."""
+    rng, rows = np.random.default_rng(5), list[list[object]]()
+    for s, (course, (far, turned)) in enumerate(zip(courses, biases, strict=True)):
+        for time in np.arange(0.7 + s, 200.0, 4.0 + s).tolist():
+            offsets = SHIPS[:, :2] + time * SHIPS[:, 2:] - course(time)
+            for dx, dy in offsets[rng.random(len(SHIPS)) < 0.9].tolist():
+                bearing = math.degrees(math.atan2(dy, dx) + rng.normal(0.0, 0.012)) + turned
+                reach = math.hypot(dx, dy) + rng.normal(0.0, 20.0) + far
+                rows.append([time, f"r{s}", reach, bearing, *course(time).tolist()])
+    with (folder / "scans.csv").open("w", newline="") as file:
+        csv.writer(file).writerows([["time", "sensor", "range", "bearing_deg", "own_x", "own_y"], *rows])
+    sensors = "".join(f"  - {{name: r{s}, position: [0, 0], bias: {{range: 7.0}}}}\n" for s in range(len(courses)))
+    (folder / "radars.yaml").write_text(TEXT + sensors, "utf-8")
+    problem = build_problem(scenario_from_recording(folder / "radars.yaml", folder / "scans.csv").scenario)
+    return calibrate(problem, only=[each for each in problem.parameters if each.kind in kinds])
+
+
+def by_name(calibration: Calibration) -> dict[tuple[int, str], ParameterEstimate]:
+    return {(each.parameter.sensor, each.parameter.name): each for each in calibration.estimates}
+
+
+def test_the_range_of_one_radar_at_rest_is_not_reported(tmp_path: Path) -> None:
+    calibration = calibration_of(tmp_path, [at(0.0, 0.0)], [(0.0, 0.0)], ("bias", "noise"))
+    found = by_name(calibration)
+    assert calibration.converged
+    assert found[0, "range"].reason == (
+        "not identifiable: there is no other sensor to separate it from another motion of the targets than assumed"
+    )
+    assert found[0, "bearing_deg"].reason == (
+        "not identifiable: there is no other sensor to separate it from a rotation of all targets"
+    )
+    assert (found[0, "range"].value, found[0, "bearing_deg"].value) == (7.0, 0.0)  # as given
+    assert math.isnan(found[0, "range"].ci_low)
+    for name in ("noise.sigma_range", "noise.sigma_bearing_deg"):
+        assert found[0, name].ci_low < found[0, name].ci_high
+
+
+def test_a_radar_that_weaves_finds_its_range(tmp_path: Path) -> None:
+    found = by_name(calibration_of(tmp_path, [weaving], [(150.0, 0.0)]))
+    one = found[0, "range"]
+    assert one.std < 40.0
+    assert abs(one.value - 150.0) < 3.0 * one.std
+
+
+def test_radars_on_one_mast_are_compared_with_the_first(tmp_path: Path) -> None:
+    found = by_name(calibration_of(tmp_path, [at(0.0, 0.0), at(10.0, 0.0)], [(80.0, 0.5), (-60.0, -0.8)]))
+    for name in ("range", "bearing_deg"):
+        assert "no other sensor observes enough of the same targets from another place" in found[0, name].reason
+    for name, truth in (("range", 7.0 - 140.0), ("bearing_deg", -1.3)):
+        one = found[1, name]
+        assert abs(one.value - truth) < 3.0 * one.std, name
+    assert found[1, "range"].std < 20.0
+
+
+@pytest.mark.parametrize(
+    ("courses", "wanted"),
+    [
+        ([at(0.0, 0.0)], True),
+        ([straight], True),
+        ([at(0.0, 0.0), at(20.0, 0.0)], True),
+        ([straight, lambda time: straight(time) + 15.0], True),
+        ([weaving], False),
+        ([at(0.0, 0.0), at(0.0, 900.0)], False),
+        ([straight, at(0.0, 0.0)], False),
+    ],
+)
+def test_sensors_on_one_straight_course_are_at_one_place(courses: Sequence[Course], wanted: bool) -> None:
+    rows = [(time, s, *course(time)) for s, course in enumerate(courses) for time in np.arange(0.0, 200.0, 5.0)]
+    table = np.array(rows)
+    num, none = len(table), np.zeros(len(courses), np.int64)
+    sensors, zeros = table[:, 1].astype(np.int64), np.zeros((num, 2))
+    states = np.column_stack([np.full(num, 500.0), np.full(num, 3000.0), zeros])
+    pairs = MatchedMeasurements(
+        table[:, 0], sensors, np.zeros(num, np.int64), zeros, table[:, 2:], states, none, none, none
+    )
+    assert is_one_place(pairs, range(len(courses))) is wanted
+    assert is_one_place(pairs, [len(courses)])  # a sensor without measurements of any target
