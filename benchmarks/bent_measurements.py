@@ -39,7 +39,7 @@ class Updater:
     def __init__(self, method: str, noise: Any) -> None:
         clutter = models.region_clutter(1.0, models.Region(-1e5, 1e5, -1e5, 1e5), "bearing_range")
         parts = models.bearing_range(), models.constant_noise(noise), models.constant_detection(0.9), clutter
-        self.kernel, self.angular = models.SensorModel(*parts, method).to_kernel(), parts[0].angular
+        self.kernel, self.periods = models.SensorModel(*parts, method).to_kernel(), parts[0].periods
         self.work, self.pose = make_pair_work(4, 2), np.zeros(3)
 
     def __call__(self, mean: Any, cov: Any, measurement: Any) -> tuple[Any, Any, bool]:
@@ -49,7 +49,7 @@ class Updater:
         if innovation.bends[0]:
             relinearise(self.kernel, Pair(self.pose, mean, cov, measurement), self.work)
         else:
-            whiten(innovation, 0, measurement, self.angular, np.inf, scratch.residual)
+            whiten(innovation, 0, measurement, self.periods, np.inf, scratch.residual)
         update_mean(innovation, 0, scratch.residual, mean, out)
         return out, innovation.covs[0].copy(), bool(innovation.bends[0])
 

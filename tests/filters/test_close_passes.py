@@ -45,7 +45,7 @@ def update(own: models.SensorModel, pose: Any, mean: Any, cov: Any, measured: An
     if innovation.bends[0]:
         distance = relinearise(kernel, Pair(pose, mean, cov, measured), work)
     else:
-        distance = whiten(innovation, 0, measured, own.measurement.angular, np.inf, residual)
+        distance = whiten(innovation, 0, measured, own.measurement.periods, np.inf, residual)
     update_mean(innovation, 0, residual, mean, after)
     return after, innovation.covs[0].copy(), innovation.log_norm[0] - 0.5 * distance
 

@@ -22,7 +22,7 @@ from vedette.live.messages import read_message
 from vedette.recorded import Conventions, RecordedSensor, parse_scans
 from vedette.recorded.tables import Table
 from vedette.scenarios import Scenario, parse_scenario
-from vedette.scenarios.build import build_experiment, build_planner
+from vedette.scenarios.build import build_experiment, build_planner, build_sensors
 from vedette.scenarios.calibration import build_problem
 from vedette.scenarios.from_recording import scenario_from_recording, scenario_from_sensors
 from vedette.scenarios.sections.recording import recorded_sensors
@@ -179,8 +179,41 @@ def test_a_constraint_on_visits_has_no_room_for_velocities() -> None:
         scenario(control={"decision_every": 4, "constraints": [revisit]})
 
 
+def folded(most: float = 4.0, **clutter: Any) -> Scenario:
+    """The scene, with range rates folded at far less than those of its targets."""
+    defaults = scenario().model.model_dump(mode="json", exclude_none=True)["sensors"][0]
+    own = {
+        "measurement": {"kind": "bearing_range_rate", "max_unambiguous_range_rate": most},
+        "clutter": {"kind": "region", "rate": 1.0, **clutter},
+        "noise": defaults["noise"],
+        "detection": defaults["detection"],
+    }
+    return scenario(sensor_defaults=own, time={"num_steps": 25, "step_period": 2.0, "start": 2.0})
+
+
+def test_a_run_with_folded_range_rates_finds_the_velocities() -> None:
+    made = folded()
+    score = partial(ospa_of_run, cutoff=100.0, order=1.0)
+    record = simulate(build_experiment(made), build_planner(made, "random", 1), seed=3, run=0, score=score)
+    rates = np.abs([rate for rate in scan_table(record, made)["range_rate_mps"] if rate is not None])
+    assert 3.5 < rates.max() <= 4.0
+    truth, last = record.truth.states[-2:], record.estimates[-1]
+    assert last.num_targets == 2
+    nearest = np.hypot(*(last.means[:, None, :2] - truth[:, :2]).transpose(2, 0, 1)).argmin(axis=1)
+    np.testing.assert_allclose(last.means[:, 2:4], truth[nearest, 2:4], atol=1.5)
+
+
+def test_clutter_of_folded_range_rates_is_uniform_over_the_interval() -> None:
+    (clutter, *_) = (sensor.filter.sensor.clutter for sensor in build_sensors(folded()))
+    level = clutter.log_intensity_at([[0.5, 200.0, 3.9], [0.5, 200.0, -1.0]], np.array([-900.0, 0.0, 0.0]))
+    assert level == pytest.approx([math.log(200.0 / 4e6 / 8.0)] * 2)
+    with pytest.raises(ScenarioError, match=r"expected at most 4, where range rates are folded, got 30"):
+        folded(max_range_rate=30.0)
+
+
 @pytest.mark.slow
-def test_calibrate_finds_bias_and_noise_of_range_rates(tmp_path: Path) -> None:
+@pytest.mark.parametrize("most", [None, 6.0])
+def test_calibrate_finds_bias_and_noise_of_range_rates(tmp_path: Path, most: float | None) -> None:
     rows, rng = [], np.random.default_rng(4)
     places, biases, stds = {"a": [-4000.0, 0.0], "b": [0.0, -4000.0]}, {"a": 3.0, "b": -1.5}, [0.004, 15.0, 0.6]
     tracks = [[-1500.0, 0.0, 8.0, 3.0], [900.0, -900.0, -4.0, 9.0], [0.0, 1500.0, 2.0, -10.0], [500.0, 700.0, 9.0, 5.0]]
@@ -189,18 +222,23 @@ def test_calibrate_finds_bias_and_noise_of_range_rates(tmp_path: Path) -> None:
             for state in np.array(tracks):
                 at, v = state[:2] + 5.0 * k * state[2:] - place, state[2:]
                 measured = [math.atan2(at[1], at[0]), math.hypot(*at), at @ v / math.hypot(*at) + biases[name]]
-                rows.append([5.0 * k, name, *(np.array(measured) + stds * rng.standard_normal(3)).tolist()])
+                bearing, distance, rate = (np.array(measured) + stds * rng.standard_normal(3)).tolist()
+                rate = rate if most is None else math.remainder(rate, 2.0 * most)
+                rows.append([5.0 * k, name, bearing, distance, rate])
     with (tmp_path / "scans.csv").open("w", newline="") as file:
         csv.writer(file).writerows([["time", "sensor", "bearing_rad", "range_m", "range_rate_mps"], *rows])
+    own = "" if most is None else f", max_unambiguous_range_rate: {most}"
     (tmp_path / "radars.yaml").write_text(
         "motion: {kind: constant_velocity, sigma_v: 0.05}\nrecording: {bearings: east}\nsensor_defaults:\n"
-        "  measurement: {kind: bearing_range_rate}\n  detection: {kind: constant, probability: 0.9}\n"
+        f"  measurement: {{kind: bearing_range_rate{own}}}\n"
+        "  detection: {kind: constant, probability: 0.9}\n"
         "  noise: {kind: range_dependent, sigma_range: 20.0, eta_range: 0.0, sigma_range_rate: 1.0}\n"
         "sensors:\n  - {name: a, position: [-4000.0, 0.0]}\n  - {name: b, position: [0.0, -4000.0]}\n",
         "utf-8",
     )
     made = scenario_from_recording(tmp_path / "radars.yaml", tmp_path / "scans.csv", speed=20.0)
-    assert made.scenario.model.sensors[0].clutter.max_range_rate > 9.0
+    largest = made.scenario.model.sensors[0].clutter.max_range_rate
+    assert largest is None if most is not None else largest > 9.0
     found = {
         (each.parameter.sensor, each.parameter.name): each for each in calibrate(build_problem(made.scenario)).estimates
     }

@@ -39,7 +39,7 @@ from stonesoup.types.state import GaussianState, State, StateVector, WeightedGau
 from vedette.errors import InputError
 from vedette.models import SensorModel, constant_detection, measurement_space_clutter
 from vedette.models.functions import write_rows
-from vedette.models.measurement import wrap_angular
+from vedette.models.measurement import wrap_periodic
 from vedette.recorded.detections import elements_of
 from vedette.stonesoup import (
     StateLayout,
@@ -140,14 +140,14 @@ def test_measurements_are_stone_soups_own(name: str, vector: list[float]) -> Non
     measurement, pose, ours = convert_measurement(model, PLANE), convert_pose(model), PLANE.states([vector])
     their = Detection(model.function(state, noise=False), measurement_model=model)
     taken = np.array([elements_of(their, measured_quantities(model), model, "here")])
-    off = wrap_angular(taken - measurement.measure(ours, pose), measurement.angular)
+    off = wrap_periodic(taken - measurement.measure(ours, pose), measurement.periods)
     np.testing.assert_allclose(off, 0.0, atol=1e-10)
 
     # As likely as they say, of a measurement that is some way off.
     aside = np.resize([0.03, 12.0], model.ndim_meas)
     noisy = Detection(model.function(state, noise=False) + aside[:, np.newaxis], measurement_model=model)
     taken = np.array([elements_of(noisy, measured_quantities(model), model, "here")])
-    off = wrap_angular(taken - measurement.measure(ours, pose), measurement.angular)[0]
+    off = wrap_periodic(taken - measurement.measure(ours, pose), measurement.periods)[0]
     cov = convert_noise(model).covs(ours, pose, model.ndim_meas)[0]
     np.testing.assert_allclose(cov, np.asarray(model.covar(), float), rtol=1e-12)
     log_density = multivariate_normal.logpdf(off, cov=cov)
@@ -168,7 +168,7 @@ def test_measurements_are_stone_soups_own(name: str, vector: list[float]) -> Non
             np.asarray(model.function(State(StateVector(vector + side * aside)), noise=False), float).ravel()
             for side in (-1.0, 1.0)
         ]
-        between = wrap_angular((ends[1] - ends[0])[np.newaxis], measurement.angular)[0] / 2e-3
+        between = wrap_periodic((ends[1] - ends[0])[np.newaxis], measurement.periods)[0] / 2e-3
         np.testing.assert_allclose(slope[0][:, column], between, rtol=1e-8, atol=1e-8)
 
 

@@ -18,15 +18,16 @@ from vedette.densities.containers import unchecked
 from vedette.densities.tracks import gaussian_tracks, relabelled_tracks
 from vedette.errors import InputError, ModelError, VedetteError
 from vedette.internal.unit_warnings import warn_implausible
-from vedette.kernels.base.types import Bools, Floats, Ints, Lmb
+from vedette.kernels.base.types import Floats, Ints, Lmb
 from vedette.kernels.gaussian.row_noise import row_length
 from vedette.kernels.gaussian.scans import examined_scan
 from vedette.kernels.labelled import births as kernels
 from vedette.models import BirthModel, SensorModel
 from vedette.models.arguments import as_array, reject, step_number
-from vedette.models.measurement import MeasurementModel, wrap_angular
+from vedette.models.measurement import MeasurementModel, wrap_periodic
 from vedette.models.row_noise import check_row_noise, measured_part
 
+_WITHIN = 0.9995  # half periods; components beyond may need to be wrapped
 _MOST_STDS = 10.0  # standard deviations of noise below the least noise-free measurement
 _NO_ROWS = np.empty(0, np.int64)
 _PACKAGE = Path(__file__).parents[1]
@@ -36,8 +37,9 @@ _Density = TypeVar("_Density", GLMB, LMB, FactoredGLMB, Poisson, IidCluster, Mul
 def check_scan(scan: Any, sensor: SensorModel) -> tuple[Floats, Ints]:
     """Return the scan as a contiguous (num, meas_dim) array without repeated rows, and the rows that were repeats.
 
-    Rows that bring their noise (`vedette.models.with_row_noise`) are longer. Angles are returned in (-pi, pi]. Warns of
-    values too far below the least possible value for noise, such as a negative range.
+    Rows that bring their noise (`vedette.models.with_row_noise`) are longer. Angles are returned in (-pi, pi], and
+    other components with a period within half of it. Warns of values too far below the least possible value for noise,
+    such as a negative range.
 
     Raises:
         InputError: not an array of that shape, a value that is not finite, or an angle beyond a full turn either way,
@@ -57,15 +59,15 @@ def check_scan(scan: Any, sensor: SensorModel) -> tuple[Floats, Ints]:
     if given.ndim != 2 or (brings_noise and given.shape[1] != row_length(meas_dim)):
         raise InputError(f"scan: expected {expected}; got shape {given.shape}")
     array = np.array(given, dtype=np.float64, order="C")
-    bad, is_below, largest, may_repeat = examined_scan(array, measurement.least, measurement.angular)
+    bad, is_below, largest, may_repeat = examined_scan(array, measurement.least, measurement.periods)
     if bad >= 0:
         raise InputError(f"scan: expected finite numbers; got {array[bad].tolist()} in row {bad}")
     if brings_noise:
         check_row_noise("scan", array, meas_dim)
     if is_below:
         _warn_negative(array, measurement, sensor.noise.least_stds)
-    if largest > 3.14:  # rare
-        array, may_repeat = _wrap_angles(array, measurement.angular), True
+    if largest > _WITHIN:  # rare
+        array, may_repeat = _wrapped(array, measurement), True
     if not may_repeat:  # most scans
         return array, _NO_ROWS
     _, first = np.unique(array, axis=0, return_index=True)
@@ -83,16 +85,16 @@ def _warn_negative(scan: Floats, measurement: MeasurementModel, stds: Floats | N
         warn_implausible("scan", least, got, "a sign, or components exchanged")
 
 
-def _wrap_angles(scan: Floats, angular: Bools) -> Floats:
-    measured = measured_part(scan, len(angular))
+def _wrapped(scan: Floats, measurement: MeasurementModel) -> Floats:
+    angular, measured = measurement.angular, measured_part(scan, measurement.meas_dim)
     sizes = np.abs(measured[:, angular])
-    if sizes.max() > 2.0 * math.pi:
+    if sizes.max(initial=0.0) > 2.0 * math.pi:
         row = int(np.argmax(sizes.max(axis=1)))
         raise InputError(
             f"scan: expected angles in radians, in (-pi, pi]; got {scan[row].tolist()} in row {row}, whose component "
             f"{int(np.flatnonzero(angular)[np.argmax(sizes[row])])} is an angle (is it in degrees?)"
         )
-    return np.column_stack([wrap_angular(measured, angular), scan[:, len(angular) :]])
+    return np.column_stack([wrap_periodic(measured, measurement.periods), scan[:, len(angular) :]])
 
 
 def check_belief(belief: object, kind: type[_Density], state_dim: int, name: str = "belief") -> _Density:

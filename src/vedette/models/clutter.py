@@ -27,7 +27,7 @@ from vedette.models.arguments import (
 )
 from vedette.models.fields import NonNegative, Reals, part
 from vedette.models.functions import ModelFunction, describe, model_function, numbers_at, require_kind
-from vedette.models.measurement import MeasurementModel, angular_flags, wrap_angular
+from vedette.models.measurement import MeasurementModel, angular_flags, wrap_periodic
 from vedette.models.probe import probe_log_intensity
 
 # Number of clutter scans that a check draws and compares with the intensity.
@@ -174,7 +174,7 @@ class _BoxSampler:
     ) -> Floats:
         num_clutter = int(rng.poisson(self.rate))
         drawn = rng.uniform(self.low, self.high, size=(num_clutter, len(self.low)))
-        return wrap_angular(drawn, measurement.angular) if measurement.meas_dim == len(self.low) else drawn
+        return wrap_periodic(drawn, measurement.periods) if measurement.meas_dim == len(self.low) else drawn
 
 
 def plane_params(kind: str, max_range_rate: float | None, max_height: float | None = None) -> Floats:

@@ -12,7 +12,8 @@ from vedette.errors import ModelError
 from vedette.internal.quantities import QUANTITIES
 from vedette.kernels.base.types import HEIGHT, Bools, Floats
 from vedette.kernels.gaussian.beam import passage, to_scan_time, turns
-from vedette.kernels.gaussian.scans import put_on_circle
+from vedette.kernels.gaussian.scans import wrap_columns
+from vedette.kernels.gaussian.scratch import FULL_TURN
 from vedette.models.arguments import dimension, float_array, params_vector, pose_vector, reject, state_table
 from vedette.models.fields import part
 from vedette.models.functions import ModelFunction, model_function, require_kind, write_rows
@@ -48,6 +49,9 @@ def position() -> MeasurementModel:
     return MeasurementModel(2, *functions, places=_places, is_linear=True, components=("x", "y"))
 
 
+_ANGLES = np.array([FULL_TURN])
+
+
 def angular_flags(name: str, angular: Sequence[bool] | Bools, meas_dim: int) -> Bools:
     """Return the flags of the components that are angles, (meas_dim,); an empty `angular` means no angles."""
     flags = np.array(angular)
@@ -61,13 +65,15 @@ def angular_flags(name: str, angular: Sequence[bool] | Bools, meas_dim: int) -> 
 def wrap_angles(angles: Floats) -> Floats:
     """Return the angles wrapped to (-pi, pi]; angles already in it keep every bit."""
     wrapped = np.array(angles, dtype=np.float64, order="C")
-    put_on_circle(wrapped.reshape(-1))
+    wrap_columns(wrapped.reshape(-1, 1), _ANGLES)
     return wrapped
 
 
-def wrap_angular(measurements: Floats, angular: Bools) -> Floats:
-    """Return the measurements with their angles wrapped to (-pi, pi], (n, meas_dim)."""
-    return np.where(angular, wrap_angles(measurements), measurements)
+def wrap_periodic(measurements: Floats, periods: Floats) -> Floats:
+    """Return the measurements with each component wrapped to (-period / 2, period / 2], (n, meas_dim)."""
+    wrapped = np.array(measurements, dtype=np.float64, order="C")
+    wrap_columns(wrapped, periods)
+    return wrapped
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -83,6 +89,9 @@ class MeasurementModel:
             else that there are no angles. Residuals of angles are wrapped to (-pi, pi].
         least: (meas_dim,) smallest value of each component without noise, such as 0 for a range; () means that
             `components` determines them, else that there are no limits.
+        periods: (meas_dim,) interval after which a component repeats, such as twice the largest unambiguous range rate
+            of a Doppler radar; residuals are wrapped to half of it either way. inf: it does not repeat; () means 2 pi
+            for angles, inf for others.
         places: plain function of (n, meas_dim) measurements and a pose: the (n, 2) positions of the targets in m, or
             (n, 3) with heights for states [px, py, vx, vy, pz, vz]; None if a measurement determines no position.
             Births from measurements need it.
@@ -105,6 +114,7 @@ class MeasurementModel:
     least: Floats = field(default_factory=lambda: np.empty(0))
     is_linear: bool = False
     components: tuple[str, ...] = ()
+    periods: Floats = field(default_factory=lambda: np.empty(0))
 
     def __post_init__(self) -> None:
         dimension("MeasurementModel.meas_dim", self.meas_dim)
@@ -126,6 +136,12 @@ class MeasurementModel:
         object.__setattr__(self, "least", float_array("MeasurementModel.least", least, (self.meas_dim,), finite=False))
         angular = self.angular if np.size(self.angular) else [each.is_angle for each in quantities]
         object.__setattr__(self, "angular", angular_flags("MeasurementModel.angular", angular, self.meas_dim))
+        periods = self.periods if np.size(self.periods) else np.where(self.angular, FULL_TURN, np.inf)
+        periods = float_array("MeasurementModel.periods", periods, (self.meas_dim,), finite=False)
+        if not ((periods > 0.0) & (~self.angular | (periods == FULL_TURN))).all():
+            wanted = f"numbers above 0, {FULL_TURN!r} for an angle"
+            raise reject("MeasurementModel.periods", wanted, periods.tolist())
+        object.__setattr__(self, "periods", periods)
 
     def measure(self, states: ArrayLike, pose: ArrayLike) -> Floats:
         """Return the noise-free measurements of (n, state_dim) states, (n, meas_dim).

@@ -16,7 +16,9 @@ import numpy as np
 from vedette.kernels.base.compile import inlined
 from vedette.kernels.base.types import OWN_VELOCITY, Floats
 from vedette.kernels.gaussian.beam import offset_at_beam, passage, to_scan_time
-from vedette.models.fields import part
+from vedette.kernels.gaussian.scratch import FULL_TURN
+from vedette.models.arguments import positive
+from vedette.models.fields import Positive, part
 from vedette.models.functions import model_function
 from vedette.models.measurement import MeasurementModel
 from vedette.models.turns import own_places
@@ -131,14 +133,24 @@ def bearing_range() -> MeasurementModel:
 
 
 @part("bearing_range_rate", "measurement")
-def bearing_range_rate() -> MeasurementModel:
+def bearing_range_rate(max_unambiguous_range_rate: Positive | None = None) -> MeasurementModel:
     """z = [bearing in rad, range in m, range rate in m/s] of a Doppler radar; positive if the range grows.
 
     The range rate is relative to the sensor. The sensor's velocity in m/s is in components 6 and 7 of its pose, after
     the components of cameras and budgets; a sensor with a shorter pose is at rest. States are [px, py, vx, vy, ...].
+
+    Range rates folded at v are measured modulo 2 v, in (-v, v]. Residuals are wrapped to that interval. A range rate
+    counts once three predicted standard deviations are within v; it also gives a new track its velocity only then.
+
+    Args:
+        max_unambiguous_range_rate: v of range rates that are folded, wavelength times pulse repetition
+            frequency over 4; none: they are not folded [m/s].
     """
     functions = _bearing_range_rate, np.empty(0), _bearing_range_rate_jacobian
-    return MeasurementModel(3, *functions, places=_places, components=("bearing", "range", "range_rate"))
+    folded = max_unambiguous_range_rate
+    period = np.inf if folded is None else 2.0 * positive("max_unambiguous_range_rate", folded)
+    names, periods = ("bearing", "range", "range_rate"), np.array([FULL_TURN, np.inf, period])
+    return MeasurementModel(3, *functions, places=_places, components=names, periods=periods)
 
 
 @part("bearing_only", "measurement")

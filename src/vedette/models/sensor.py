@@ -161,7 +161,7 @@ def _bundle_of(model: SensorModel, rule: int) -> Sensor:
         model.noise.params,
         model.detection.params,
         model.clutter.params,
-        model.measurement.angular,
+        model.measurement.periods,
         resolve_method("SensorModel.method", model.method, jacobian is not None, bends=not model.measurement.is_linear),
         rule,
         _NO_NODES if rule == AT_CENTRE else _NODES,

@@ -14,6 +14,7 @@ from vedette.kernels.base.types import Floats
 from vedette.recorded import RecordedScans
 from vedette.recorded.extents import places_of
 from vedette.scenarios.sections import ScenarioModel
+from vedette.scenarios.sections.sensing import Measurement
 
 _SPEED_FACTOR = 1.5  # a neighbour may move at up to this number of times the speed that targets hardly exceed
 _NOISE_RADIUS = 2.5 * math.sqrt(2.0)  # noise stds between two measurements of a target that stands still
@@ -119,7 +120,7 @@ def assumed_clutter(
             sensors.append(sensor)
             continue
         rate, method = _rate(model, recording, s, folder, speed)
-        clutter = {"kind": "region", "rate": rate, **_clutter_limit(model.sensors[s].measurement.kind, recording, s)}
+        clutter = {"kind": "region", "rate": rate, **_clutter_limit(model.sensors[s].measurement, recording, s)}
         sensors.append({**sensor, "clutter": clutter})
         rates.setdefault(method, []).append(f"{model.sensor_names[s]} {rate:g}")
     if rates:
@@ -127,12 +128,16 @@ def assumed_clutter(
     return {"sensors": sensors}
 
 
-def _clutter_limit(kind: str, recording: RecordedScans, s: int) -> dict[str, float]:
-    """Return the limit of range rate or height of clutter: a tenth above the largest value in the recording."""
-    component = next((name for name in COMPONENTS[kind] if name in ("range_rate", "altitude")), None)
-    if component is None:
+def _clutter_limit(measurement: Measurement, recording: RecordedScans, s: int) -> dict[str, float]:
+    """Return the limit of range rate or height of clutter: a tenth above the largest value in the recording.
+
+    Without an entry folded range rates are uniform over their interval.
+    """
+    names = COMPONENTS[measurement.kind]
+    component = next((name for name in names if name in ("range_rate", "altitude")), None)
+    if component is None or getattr(measurement, "max_unambiguous_range_rate", None) is not None:
         return {}
-    place = COMPONENTS[kind].index(component)
+    place = names.index(component)
     values = [np.empty(0), *(scan[:, place] for scans in recording.scans if (scan := scans[s]) is not None)]
     largest = float(f"{1.1 * np.abs(np.concatenate(values)).max(initial=0.0):.3g}")
     return {"max_range_rate" if component == "range_rate" else "max_height": max(1.0, largest)}

@@ -24,6 +24,7 @@ from vedette.scenarios.build import build_sensors
 from vedette.scenarios.dumping import dump_data
 from vedette.scenarios.loading import Scenario
 from vedette.scenarios.sections.recording import recorded_sensors
+from vedette.scenarios.sections.sensing import Clutter
 from vedette.scenarios.sections.sensors import Sensor
 from vedette.scenarios.yaml_reader import MAX_BYTES, read_yaml
 from vedette.tracking import Central, Tracker
@@ -115,11 +116,20 @@ def _widen_clutter(sensor: Sensor) -> dict[str, float]:
     Clutter must not end where noise at the edge of the view may take a measurement: no clutter would be possible there,
     and the likelihood would jump.
     """
-    clutter = sensor.clutter
+    clutter, folded = sensor.clutter, getattr(sensor.measurement, "max_unambiguous_range_rate", None)
+    if clutter.kind not in ("region", "around_sensor"):
+        return {}
+    if folded is not None:  # a bias may take a range rate out of the interval in which it is measured
+        most = clutter.max_range_rate or folded
+        wider = _wider_figure(clutter)
+        return wider | {"rate": _WIDENING * wider["rate"], "max_range_rate": _WIDENING * most}
+    return _wider_figure(clutter)
+
+
+def _wider_figure(clutter: Clutter) -> dict[str, float]:
+    """Return fields of clutter in a larger part of the plane, at the same density."""
     if clutter.kind == "region":
         return {"rate": _WIDENING**2 * clutter.rate}
-    if clutter.kind != "around_sensor":
-        return {}
     size = "radius" if clutter.radius is not None else "half_side"
     wider = {"rate": _WIDENING**2 * clutter.rate, size: _WIDENING * getattr(clutter, size)}
     if size == "radius":  # the area of a sector of a square depends on the heading

@@ -9,6 +9,7 @@ import numpy as np
 
 from vedette.kernels.base.types import Floats, Ints
 from vedette.models import MotionModel, SensorModel
+from vedette.models.measurement import wrap_periodic
 
 # Step of central differences, in units of the state.
 _STEP = 1e-3
@@ -79,9 +80,8 @@ def scan_information(sensor: SensorModel, states: Floats, pose: Floats) -> Float
     """(num, dim, dim) P_D H' R^-1 H of one scan of targets at (num, dim) states."""
     num, dim = states.shape
     measured = sensor.measurement.measure(_shifted(states), pose).reshape(2, dim, num, sensor.meas_dim)
-    change = measured[0] - measured[1]
-    angular = sensor.measurement.angular
-    change[..., angular] = np.remainder(change[..., angular] + np.pi, 2.0 * np.pi) - np.pi
+    change = (measured[0] - measured[1]).reshape(-1, sensor.meas_dim)
+    change = wrap_periodic(change, sensor.measurement.periods).reshape(dim, num, sensor.meas_dim)
     jacobians = change.transpose(1, 2, 0) / (2.0 * _STEP)
     weights = np.linalg.inv(sensor.noise.covs(states, pose, sensor.meas_dim))
     detection = sensor.detection.prob(states, pose)[:, np.newaxis, np.newaxis]

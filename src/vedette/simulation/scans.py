@@ -17,6 +17,7 @@ from vedette.models import SensorModel
 from vedette.models.arguments import float_array, generator, pose_vector, reject
 from vedette.models.bias import NO_BIAS, with_offsets
 from vedette.models.functions import numbers_at, write_rows
+from vedette.models.measurement import wrap_periodic
 from vedette.simulation.true_sensors import TrueSensor
 from vedette.tracking import StageTimer
 
@@ -158,7 +159,9 @@ def _biased(sensor: TrueSensor, measured: Floats) -> Floats:
     """Return the measurements with the bias of the sensor."""
     names = sensor.model.measurement.components
     offsets = np.array([getattr(sensor.bias, name) for name in names])
-    return with_offsets(measured, offsets, names) if offsets.any() else measured
+    if not offsets.any():
+        return measured
+    return wrap_periodic(with_offsets(measured, offsets, names), sensor.model.measurement.periods)
 
 
 def _detected_at(sensor: TrueSensor, states: Floats, pose: Floats, measured: Floats) -> Floats:
@@ -184,7 +187,7 @@ def _noisy_measurements(sensor: SensorModel, states: Floats, pose: Floats, norma
     noise = (factors @ normals[:, :, np.newaxis])[:, :, 0]
     measured = np.empty(normals.shape)
     write_rows(sensor.measurement.function, states, pose, sensor.measurement.params, measured)
-    bad = add_noise(measured, noise, sensor.measurement.angular)
+    bad = add_noise(measured, noise, sensor.measurement.periods)
     if bad >= 0:
         state, got = states[bad], measured[bad]
         raise ModelError(f"sensor model at state {state}, pose {pose}: expected a finite measurement; got {got}")

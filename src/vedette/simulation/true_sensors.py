@@ -71,10 +71,12 @@ def true_sensors_of(given: Sequence[TrueSensor], known: Sequence[SensorModel]) -
     for s, (true, model) in enumerate(zip(given, known, strict=True)):
         if not isinstance(true, TrueSensor):
             raise reject(f"true_sensors[{s}]", "a TrueSensor", true)
-        wanted, angular = (sensor_model.measurement.angular.tolist() for sensor_model in (model, true.model))
-        if angular != wanted:
-            expected = f"measurements of {len(wanted)} components with the angular flags {wanted}, as the filter's"
-            raise reject(f"true_sensors[{s}]", expected, angular)
+        for name in ("angular", "periods"):
+            wanted, own = (getattr(each.measurement, name).tolist() for each in (model, true.model))
+            if own != wanted:
+                words = {"angular": "angular flags"}.get(name, name)
+                expected = f"measurements of {len(wanted)} components with the {words} {wanted}, as the filter's"
+                raise reject(f"true_sensors[{s}]", expected, own)
     return tuple(given)
 
 

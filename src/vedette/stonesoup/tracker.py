@@ -19,7 +19,7 @@ from stonesoup.types.update import GaussianStateUpdate
 from vedette.densities import marginal_estimate
 from vedette.errors import InputError
 from vedette.kernels.base.types import Floats
-from vedette.models.measurement import wrap_angular
+from vedette.models.measurement import wrap_periodic
 from vedette.stonesoup.converting import ConvertedModels
 from vedette.stonesoup.scans import ScanConverter, Scans
 from vedette.tracking import State, TrackerInfo
@@ -130,7 +130,7 @@ class LabelledTracker(_TrackerMixInUpdate, Tracker):  # type: ignore[misc] # Sto
         ):
             if scan is None or not len(scan):
                 continue
-            off = wrap_angular(scan - sensor.measurement.measure(mean, pose), sensor.measurement.angular)
+            off = wrap_periodic(scan - sensor.measurement.measure(mean, pose), sensor.measurement.periods)
             precision = np.linalg.inv(sensor.noise.covs(mean, pose, sensor.meas_dim)[0])
             distances = np.einsum("ni,ij,nj->n", off, precision, off)
             if distances.min() < best:

@@ -9,9 +9,12 @@ import numpy as np
 
 from vedette.densities import LMB
 from vedette.kernels.base.types import Floats
+from vedette.kernels.gaussian.innovation import FOLDED_STDS
+from vedette.kernels.gaussian.scratch import FULL_TURN
 from vedette.models import SensorModel
 from vedette.models.arguments import pose_vector
 from vedette.models.functions import write_rows
+from vedette.models.measurement import wrap_periodic
 from vedette.models.row_noise import measured_part, noise_of_rows
 from vedette.models.turns import is_turn, lags
 
@@ -89,8 +92,12 @@ def _condition(means: Floats, covs: Floats, std: Floats, sensor: SensorModel, sc
     covs_of_noise = noise_of_rows(scan, sensor.noise.covs(states_at_rest, pose, sensor.meas_dim))
     slope, noise = slopes[matched][:, rows, 2:4], covs_of_noise[matched][:, rows][:, :, rows]
     off = measured_part(scan, sensor.meas_dim) - model.measure(states_at_rest, pose)
-    residual = off[matched][:, rows] - (slope @ means[births, 2:4, np.newaxis])[..., 0]
-    prior = covs[births, 2:4, 2:4]
+    prior, periods = covs[births, 2:4, 2:4], model.periods[rows]
+    residual = wrap_periodic(off[matched][:, rows] - (slope @ means[births, 2:4, np.newaxis])[..., 0], periods)
+    spread = slope @ prior @ slope.swapaxes(1, 2)
+    # A folded component that may be one of several periods has no effect.
+    reach = np.where(periods == FULL_TURN, 0.0, FOLDED_STDS * np.sqrt(np.diagonal(spread, axis1=1, axis2=2)))
+    slope = np.where((reach > 0.5 * periods)[..., np.newaxis], 0.0, slope)
     innovation = slope @ prior @ slope.swapaxes(1, 2) + noise
     gain = np.linalg.solve(innovation, slope @ prior).swapaxes(1, 2)
     means[births, 2:4] += (gain @ residual[..., np.newaxis])[..., 0]

@@ -61,7 +61,7 @@ def seen_intensity(intensity: Mixture, scan: ScanInput, sensor: Sensor) -> Rows:
 
     The rows are never absent.
     """
-    num, state_dim, meas_dim = len(intensity.log_weights), intensity.means.shape[1], len(sensor.angular)
+    num, state_dim, meas_dim = len(intensity.log_weights), intensity.means.shape[1], len(sensor.periods)
     rows = make_rows(num, num, state_dim, meas_dim)
     for c in range(num):
         rows.labels[c, 0], rows.labels[c, 1] = 0, 0
@@ -94,9 +94,9 @@ def missed_intensity(seen: Rows, scan: ScanInput, sensor: Sensor, num: int) -> t
 
 @kernel
 def _gated_pairs(seen: Rows, num_local: int, scan: Floats, log_clutter: Floats, sight: Sight, gate: float) -> _Pairs:
-    near = near_measurements(seen, scan, sight.sensor.angular, gate)
+    near = near_measurements(seen, scan, sight.sensor.periods, gate)
     num, num_rows = near.offsets[len(near.offsets) - 1], len(seen.log_absent)
-    options = make_room(0, num, num, len(scan), len(sight.sensor.angular), room_for_updated(seen, num))
+    options = make_room(0, num, num, len(scan), len(sight.sensor.periods), room_for_updated(seen, num))
     components, filled = np.empty(num, np.int64), 0
     for c in range(num_rows):
         own = c - (num_rows - num_local)
@@ -169,10 +169,10 @@ def candidates_of(
         least_logit: log of the least odds of a candidate.
         label: birth step and index of the candidate of the first measurement.
     """
-    sight = Sight(sensor, scan.pose, make_pair_work(seen.components.means.shape[1], len(sensor.angular)))
+    sight = Sight(sensor, scan.pose, make_pair_work(seen.components.means.shape[1], len(sensor.periods)))
     pairs = _gated_pairs(seen, num_local, scan.measurements, log_clutter, sight, gate)
     chosen, log_left_out, left_out = _chosen(pairs, unclaimed, least_logit)
-    num, meas_dim = len(chosen.measurements), len(sensor.angular)
+    num, meas_dim = len(chosen.measurements), len(sensor.periods)
     rows = make_rows(num, chosen.num_pairs, seen.components.means.shape[1], meas_dim)
     updated = room_for_updated(seen, chosen.num_pairs)
     options = make_room(num, 2 * num, chosen.num_pairs, len(scan.measurements), meas_dim, updated)

@@ -16,10 +16,10 @@ import numpy as np
 from vedette.kernels.association.predicted import Rows
 from vedette.kernels.base.arrays import grown_ints
 from vedette.kernels.base.compile import borrowing, inlined, kernel
-from vedette.kernels.base.types import Bools, Floats, Ints
+from vedette.kernels.base.types import Floats, Ints
 from vedette.kernels.gaussian.mixtures import descending_order
 from vedette.kernels.gaussian.row_noise import place_of_variance
-from vedette.kernels.gaussian.scratch import wrap_angle
+from vedette.kernels.gaussian.scratch import wrap
 
 # Margin of the ends of gates for rounding of distances.
 _SLACK = 1.0 + 1e-9
@@ -45,7 +45,7 @@ def _largest_variances(scan: Floats, dim: int) -> Floats:
     if scan.shape[1] > dim:
         for a in range(dim):
             for j in range(len(scan)):
-                out[a] = max(out[a], scan[j, place_of_variance(a, dim)])
+                out[a] = max(out[a], abs(scan[j, place_of_variance(a, dim)]))
     return out
 
 
@@ -96,14 +96,12 @@ def _first_from(values: Floats, least: float) -> int:
 
 
 @inlined
-def _may_be_gated(rows: Rows, row: int, measurement: Floats, angular: Bools, reaches: Floats) -> bool:
+def _may_be_gated(rows: Rows, row: int, measurement: Floats, periods: Floats, reaches: Floats) -> bool:
     """Return True if a measurement is within the gate of some component of the row along every axis."""
     for c in range(rows.offsets[row], rows.offsets[row + 1]):
         inside = True
         for a in range(reaches.shape[1]):
-            off = measurement[a] - rows.innovation.predicted[c, a]
-            if angular[a]:
-                off = wrap_angle(off)
+            off = wrap(measurement[a] - rows.innovation.predicted[c, a], periods[a])
             if not abs(off) <= reaches[c, a]:
                 inside = False
                 break
@@ -123,13 +121,13 @@ def _sort(values: Ints, first: int, last: int) -> None:
 
 
 @inlined
-def _ends(rows: Rows, row: int, axis: int, angular: Bools, reaches: Floats) -> tuple[float, float]:
-    """Return the interval of the gates of a row on the axis; for an angle that may wrap around, everything."""
+def _ends(rows: Rows, row: int, axis: int, periods: Floats, reaches: Floats) -> tuple[float, float]:
+    """Return the interval of the gates of a row on the axis; everything if it may wrap around."""
     low, high = math.inf, -math.inf
     for c in range(rows.offsets[row], rows.offsets[row + 1]):
         low = min(low, rows.innovation.predicted[c, axis] - reaches[c, axis])
         high = max(high, rows.innovation.predicted[c, axis] + reaches[c, axis])
-    if angular[axis] and (low < -math.pi or high > math.pi):
+    if low < -0.5 * periods[axis] or high > 0.5 * periods[axis]:
         return -math.inf, math.inf
     return low, high
 
@@ -147,7 +145,7 @@ def _increasing(scan: Floats, axis: int) -> tuple[Ints, Floats]:
 
 
 @kernel
-def near_measurements(rows: Rows, scan: Floats, angular: Bools, gate: float) -> Near:
+def near_measurements(rows: Rows, scan: Floats, periods: Floats, gate: float) -> Near:
     """Return the measurements that may be in the gates of each row: all that are, and few others."""
     num, num_rows = len(scan), len(rows.log_absent)
     reaches = _gate_reaches(rows, scan, gate)
@@ -155,12 +153,12 @@ def near_measurements(rows: Rows, scan: Floats, angular: Bools, gate: float) -> 
     order, values = _increasing(scan, axis)
     offsets, found, filled = np.zeros(num_rows + 1, np.int64), np.empty(4 * num_rows + num, np.int64), 0
     for row in range(num_rows):
-        low, high = _ends(rows, row, axis, angular, reaches)
+        low, high = _ends(rows, row, axis, periods, reaches)
         if filled + num > len(found):
             found = grown_ints(found, filled + num)
         at = _first_from(values, low)
         while at < num and values[at] <= high:
-            if _may_be_gated(rows, row, scan[order[at]], angular, reaches):
+            if _may_be_gated(rows, row, scan[order[at]], periods, reaches):
                 found[filled] = order[at]
                 filled += 1
             at += 1

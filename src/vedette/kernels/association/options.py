@@ -100,7 +100,7 @@ def log_clutter_at(sensor: Sensor, measurement: Floats, pose: Floats) -> float:
     level = sensor.log_clutter_intensity(measurement, pose, sensor.clutter_params)
     if math.isnan(level) or level == math.inf:
         raise ModelError("clutter model: log intensity is not a number below infinity")
-    return float(level - log_likelihood_ratio(measurement, len(sensor.angular)))
+    return float(level - log_likelihood_ratio(measurement, len(sensor.periods)))
 
 
 @borrowing
@@ -148,7 +148,7 @@ def weigh_detection(
     innovation = rows.innovation
     distance, log_norm = 0.0, innovation.log_norm[c]
     if not has_own_noise(measurement, innovation.predicted.shape[1]):
-        distance = whiten(innovation, c, measurement, sight.sensor.angular, gate, out.whitened[entry])
+        distance = whiten(innovation, c, measurement, sight.sensor.periods, gate, out.whitened[entry])
     if innovation.bends[c] and distance <= gate:
         copy_innovation(innovation, c, sight.work.innovation, 0)
         pair = Pair(sight.pose, rows.components.means[c], rows.components.covs[c], measurement)
@@ -275,8 +275,8 @@ def weighed_options_at(
     rows: Rows, scan: ScanInput, sensor: Sensor, caps: Truncation, log_clutter: Floats
 ) -> tuple[Options, float, int]:
     """Return the result of `weighed_options`; log_clutter: (num_measurements,) written as in `weigh_options`."""
-    num, near = len(scan.measurements), near_measurements(rows, scan.measurements, sensor.angular, caps.gate)
-    options = _room_for(rows, near, num, len(sensor.angular))
-    work = make_pair_work(rows.components.means.shape[1], len(sensor.angular))
+    num, near = len(scan.measurements), near_measurements(rows, scan.measurements, sensor.periods, caps.gate)
+    options = _room_for(rows, near, num, len(sensor.periods))
+    work = make_pair_work(rows.components.means.shape[1], len(sensor.periods))
     log_total, num_raised = weigh_options(rows, near, scan, sensor, caps, log_clutter, work, options)
     return options, log_total, num_raised

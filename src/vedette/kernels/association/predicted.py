@@ -114,7 +114,7 @@ def expect_rows(sensor: Sensor, scan: ScanInput, rows: Rows, scratch: Scratch) -
 
     If these bring noise of their own, each has an update of its own, as for a component over which the sensor bends.
     """
-    components, by_pair = rows.components, scan.measurements.shape[1] > len(sensor.angular)
+    components, by_pair = rows.components, scan.measurements.shape[1] > len(sensor.periods)
     for c in range(len(components.log_weights)):
         expect(sensor, scan.pose, components.means[c], components.covs[c], c, rows.innovation, scratch)
         rows.innovation.bends[c] = rows.innovation.bends[c] or by_pair
@@ -138,7 +138,7 @@ def leave_unseen(rows: Rows) -> None:
 @kernel
 def rows_of_scan(tracks: Tracks, scan: ScanInput, motion: Motion | None, sensor: Sensor) -> Rows:
     """Return the result of `predict_rows` in new arrays. motion: None if the tracks are at the time of the scan."""
-    sites, state_dim, meas_dim = scan.birth.tracks, tracks.components.means.shape[1], len(sensor.angular)
+    sites, state_dim, meas_dim = scan.birth.tracks, tracks.components.means.shape[1], len(sensor.periods)
     if motion is None:
         standing = standing_rows(tracks, meas_dim)
         expect_rows(sensor, scan, standing, make_scratch(state_dim, meas_dim))

@@ -93,7 +93,7 @@ class Sensor(NamedTuple):
     noise_params: Floats
     detection_params: Floats
     clutter_params: Floats
-    angular: Bools  # (meas_dim,) true of angles in radians, whose residuals are wrapped to (-pi, pi]
+    periods: Floats  # (meas_dim,) interval after which a component repeats, such as 2 pi for an angle; inf: it does not
     method: int  # as in `Motion`, or SWITCHED
     detection_rule: int  # AT_CENTRE, CLOSED_FORM, BY_NODES or AT_EDGES of `vedette.kernels.gaussian.detection`
     detection_nodes: Floats  # (num, 3) weight and two standard deviates per node; empty for AT_CENTRE

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -13,8 +14,8 @@ from vedette.kernels.gaussian.beam import own_height
 from vedette.kernels.gaussian.detection import detection_and_edge
 from vedette.kernels.gaussian.joseph import posterior_of_squares
 from vedette.kernels.gaussian.linalg import LOG_2PI, cholesky_of_size, log_det_from_factor
-from vedette.kernels.gaussian.row_noise import replace_noise
-from vedette.kernels.gaussian.scratch import Scratch, wrap_angle
+from vedette.kernels.gaussian.row_noise import MISSING, replace_noise
+from vedette.kernels.gaussian.scratch import Scratch, is_folded, wrap
 from vedette.kernels.gaussian.sigma_points import (
     LINEARISED,
     SWITCHED,
@@ -25,6 +26,9 @@ from vedette.kernels.gaussian.sigma_points import (
 
 # Where a scan leaves less than this of the volume that was expected of it, cov - cross' cross cancels too many digits.
 LEAST_SHRINKAGE = 1e-8
+
+# A folded component counts if its predicted standard deviation, this number of times, is within half of its period.
+FOLDED_STDS = 3.0
 
 # Second-order error of a measurement over a Gaussian, in standard deviations of the noise, from which SWITCHED treats
 # the measurement as bent. Below it the normalised error squared of the extended filter is at most 2.4 (2 is exact).
@@ -93,7 +97,7 @@ def _expect_sigma_points(
         sensor.measurement(points[i], pose, sensor.measurement_params, scratch.residual)
         for a in range(m):
             images[i, a] = scratch.residual[a]
-    moments_of_images(images, weights, m, sensor.angular, predicted, scratch.innovation_cov)
+    moments_of_images(images, weights, m, sensor.periods, predicted, scratch.innovation_cov)
     for a in range(m):
         for j in range(n):
             total = 0.0
@@ -209,6 +213,39 @@ def bends_over(pose: Floats, mean: Floats, cov: Floats, jacobian: Floats, noise:
 
 
 @inlined
+def _ignore_if_ambiguous(variance: float, component: int, period: float, noise: Floats) -> float:
+    """Give a folded component so wide a noise that it has no effect, if it may be one of several periods.
+
+    variance: of the component without noise. Returns what to add to the log likelihood, as the component is uniform
+    over its period instead.
+    """
+    if not is_folded(period) or variance <= (0.5 * period / FOLDED_STDS) ** 2 or noise[component, component] >= MISSING:
+        return 0.0
+    for a in range(noise.shape[0]):
+        noise[component, a] = 0.0
+        noise[a, component] = 0.0
+    noise[component, component] = MISSING
+    return 0.5 * (LOG_2PI + math.log(MISSING)) - math.log(period)
+
+
+@inlined
+def ignore_ambiguous(sensor: Sensor, jacobian: Floats, cov: Floats, noise: Floats) -> float:
+    """Give folded components that may be one of several periods so wide a noise that they have no effect.
+
+    They stand behind the first two. Returns what to add to the log likelihood.
+    """
+    total = 0.0
+    for a in range(2, noise.shape[0]):
+        if is_folded(sensor.periods[a]):
+            variance = 0.0
+            for i in range(cov.shape[0]):
+                for j in range(cov.shape[0]):
+                    variance += jacobian[a, i] * cov[i, j] * jacobian[a, j]
+            total += _ignore_if_ambiguous(variance, a, sensor.periods[a], noise)
+    return total
+
+
+@inlined
 def log_norm_of_factor(factor: Floats) -> float:
     """Log of the normalising constant of a Gaussian with covariance L L'."""
     return -0.5 * (log_det_from_factor(factor) + factor.shape[0] * LOG_2PI)
@@ -240,15 +277,19 @@ def expect_measurement(
     jacobian, noise, innovation = scratch.measurement_jacobian, scratch.measurement_noise, scratch.innovation_cov
     factor, cross, posterior = out.factor[at], out.whitened_cross[at], out.covs[at]
     linearised, weights = sensor.method == LINEARISED or sensor.method == SWITCHED, PointWeights(0, 0.0, 0.0)
+    log_uniform = 0.0
     sensor.measurement_noise_cov(mean, pose, sensor.noise_params, noise)
     replace_noise(measurement, noise)
     if linearised:
         sensor.measurement(mean, pose, sensor.measurement_params, out.predicted[at])
         sensor.measurement_jacobian(mean, pose, sensor.measurement_params, jacobian)
+        log_uniform = ignore_ambiguous(sensor, jacobian, cov, noise)
     out.bends[at] = sensor.method == SWITCHED and bends_over(pose, mean, cov, jacobian, noise, n, m)
     if out.bends[at] or not linearised:
         linearised = False
         weights = _expect_sigma_points(sensor, pose, mean, cov, out.predicted[at], cross, scratch)
+        for a in range(2, m):
+            log_uniform += _ignore_if_ambiguous(innovation[a, a], a, sensor.periods[a], noise)
     # A constant size is unrolled by the compiler.
     if linearised and n == 4 and m == 2:
         project(jacobian, cov, cross, innovation, 4, 2)
@@ -259,11 +300,11 @@ def expect_measurement(
         exact = condition(cov, noise, innovation, factor, cross, posterior, n, m)
     if not exact:
         posterior_of_squares(mean, cov, factor, cross, weights, scratch, posterior)
-    out.log_norm[at] = log_norm_of_factor(factor)
+    out.log_norm[at] = log_norm_of_factor(factor) + log_uniform
 
 
 @inlined
-def whiten(innovation: Innovation, at: int, measurement: Floats, angular: Bools, gate: float, out: Floats) -> float:
+def whiten(innovation: Innovation, at: int, measurement: Floats, periods: Floats, gate: float, out: Floats) -> float:
     """Whitened residual of a measurement against component `at`; returns its squared Mahalanobis distance.
 
     Once that is known to be above `gate` the rest is left undone and a lower bound of it is returned.
@@ -271,9 +312,7 @@ def whiten(innovation: Innovation, at: int, measurement: Floats, angular: Bools,
     factor = innovation.factor[at]
     distance = 0.0
     for a in range(innovation.predicted.shape[1]):
-        total = measurement[a] - innovation.predicted[at, a]
-        if angular[a]:
-            total = wrap_angle(total)
+        total = wrap(measurement[a] - innovation.predicted[at, a], periods[a])
         for k in range(a):
             total -= factor[a, k] * out[k]
         out[a] = total / factor[a, a]

@@ -23,7 +23,7 @@ def _predict_sigma_points(
         motion.transition(points[i], dt, motion.transition_params, out_mean)
         for j in range(n):
             images[i, j] = out_mean[j]
-    moments_of_images(images, weights, n, scratch.angular_state, out_mean, out_cov)
+    moments_of_images(images, weights, n, scratch.no_periods, out_mean, out_cov)
     for i in range(n):
         for j in range(n):
             out_cov[i, j] += 0.5 * (noise[i, j] + noise[j, i])

@@ -19,6 +19,7 @@ from vedette.kernels.gaussian.innovation import (
     bends_over,
     condition,
     expect_measurement,
+    ignore_ambiguous,
     log_norm_of_factor,
     make_innovation,
     project,
@@ -29,7 +30,7 @@ from vedette.kernels.gaussian.innovation import (
 from vedette.kernels.gaussian.joseph import posterior_of_squares
 from vedette.kernels.gaussian.linalg import cholesky, solve_lower, solve_upper
 from vedette.kernels.gaussian.row_noise import has_own_noise, replace_noise
-from vedette.kernels.gaussian.scratch import Scratch, make_scratch, wrap_angle
+from vedette.kernels.gaussian.scratch import Scratch, make_scratch, wrap
 from vedette.kernels.gaussian.sigma_points import (
     SWITCHED,
     UNSCENTED,
@@ -78,9 +79,7 @@ def _squared_distance(sensor: Sensor, pair: Pair, state: Floats, scratch: Scratc
         total += deviation[j] * deviation[j]
     sensor.measurement(state, pair.pose, sensor.measurement_params, residual)
     for a in range(residual.shape[0]):
-        residual[a] = pair.measurement[a] - residual[a]
-        if sensor.angular[a]:
-            residual[a] = wrap_angle(residual[a])
+        residual[a] = wrap(pair.measurement[a] - residual[a], sensor.periods[a])
     solve_lower(scratch.noise_factor, residual, residual)
     for a in range(residual.shape[0]):
         total += residual[a] * residual[a]
@@ -102,9 +101,7 @@ def _update(sensor: Sensor, pair: Pair, state: Floats, work: PairWork) -> float:
         posterior_of_squares(pair.mean, pair.cov, factor, cross, PointWeights(0, 0.0, 0.0), scratch, posterior)
     distance = 0.0
     for a in range(m):
-        total = pair.measurement[a] - innovation.predicted[0, a]
-        if sensor.angular[a]:
-            total = wrap_angle(total)
+        total = wrap(pair.measurement[a] - innovation.predicted[0, a], sensor.periods[a])
         for j in range(n):
             total += jacobian[a, j] * (state[j] - pair.mean[j])
         for k in range(a):
@@ -180,7 +177,7 @@ def _regress(sensor: Sensor, pair: Pair, work: PairWork) -> None:
         sensor.measurement(points[i], pair.pose, sensor.measurement_params, scratch.residual)
         for a in range(m):
             images[i, a] = scratch.residual[a]
-    moments_of_images(images, weights, m, sensor.angular, predicted, scratch.innovation_cov)
+    moments_of_images(images, weights, m, sensor.periods, predicted, scratch.innovation_cov)
     half, rows = 0.5 * math.sqrt(2.0 * weights.other), scratch.measurement_jacobian
     for a in range(m):
         for i in range(n):
@@ -198,7 +195,7 @@ def _regress(sensor: Sensor, pair: Pair, work: PairWork) -> None:
 def _expect_and_whiten(sensor: Sensor, pair: Pair, work: PairWork) -> float:
     """Fill the innovation of the Gaussian (noise of the pair); returns the squared distance of the measurement."""
     expect_measurement(sensor, pair.pose, pair.mean, pair.cov, pair.measurement, 0, work.innovation, work.scratch)
-    return whiten(work.innovation, 0, pair.measurement, sensor.angular, math.inf, work.scratch.residual)
+    return whiten(work.innovation, 0, pair.measurement, sensor.periods, math.inf, work.scratch.residual)
 
 
 @borrowing
@@ -209,10 +206,12 @@ def relinearise(sensor: Sensor, pair: Pair, work: PairWork) -> float:
     of no use then: the whitened residual is left in `work.scratch.residual`.
     """
     innovation, scratch = work.innovation, work.scratch
-    whiten(innovation, 0, pair.measurement, sensor.angular, math.inf, scratch.residual)
+    whiten(innovation, 0, pair.measurement, sensor.periods, math.inf, scratch.residual)
     update_mean(innovation, 0, scratch.residual, pair.mean, scratch.points[0])
     sensor.measurement_noise_cov(pair.mean, pair.pose, sensor.noise_params, scratch.measurement_noise)
     replace_noise(pair.measurement, scratch.measurement_noise)
+    sensor.measurement_jacobian(pair.mean, pair.pose, sensor.measurement_params, scratch.measurement_jacobian)
+    log_uniform = ignore_ambiguous(sensor, scratch.measurement_jacobian, pair.cov, scratch.measurement_noise)
     if not cholesky(pair.cov, scratch.factor):
         raise NumericalError("covariance of a track is not positive definite")
     if not cholesky(scratch.measurement_noise, scratch.noise_factor):
@@ -223,7 +222,7 @@ def relinearise(sensor: Sensor, pair: Pair, work: PairWork) -> float:
     _linearise(sensor, pair, scratch.points[0], work)
     _regress(sensor, pair, work)
     distance = _update(sensor, pair, scratch.points[0], work)
-    innovation.log_norm[0] = log_norm_of_factor(innovation.factor[0])
+    innovation.log_norm[0] = log_norm_of_factor(innovation.factor[0]) + log_uniform
     return distance
 
 
@@ -242,6 +241,7 @@ def learn_at_mean(sensor: Sensor, pair: Pair, share: float, work: PairWork) -> N
     for a in range(m):
         innovation.predicted[0, a] = pair.measurement[a]
     sensor.measurement_jacobian(state, pair.pose, sensor.measurement_params, jacobian)
+    ignore_ambiguous(sensor, jacobian, pair.cov, noise)
     if sensor.method == SWITCHED and bends_over(pair.pose, pair.mean, pair.cov, jacobian, noise, n, m):
         _update(sensor, pair, state, work)
         _leave_sensor(pair, state, innovation.covs[0])

@@ -13,23 +13,28 @@ CLUTTER = -1  # origin of a measurement behind which there is no target
 
 
 @inlined
-def _on_circle(angle: float) -> float:
-    """The same direction in (-pi, pi], rounded as NumPy's remainder rounds."""
-    if angle > math.pi or angle <= -math.pi:
-        return math.pi - np.remainder(math.pi - angle, 2.0 * math.pi)
-    return angle
+def _within(value: float, period: float) -> float:
+    """The same value in (-period / 2, period / 2], rounded as NumPy's remainder rounds."""
+    half = 0.5 * period
+    if value > half or value <= -half:
+        return half - np.remainder(half - value, period)
+    return value
 
 
 @kernel
-def put_on_circle(angles: Floats) -> None:
-    """Wrap (n,) angles to (-pi, pi] in place; those already there keep every bit."""
-    for i in range(len(angles)):
-        angles[i] = _on_circle(angles[i])
+def wrap_columns(values: Floats, periods: Floats) -> None:
+    """Wrap (n, dim) values to (-period / 2, period / 2] in place; those already there keep every bit."""
+    for i in range(len(values)):
+        for j in range(len(periods)):
+            values[i, j] = _within(values[i, j], periods[j])
 
 
 @kernel
-def add_noise(measured: Floats, noise: Floats, angular: Bools) -> int:
-    """Add z_i += v_i in place, angles in (-pi, pi]; returns the first row that is not finite, where it stops, or -1."""
+def add_noise(measured: Floats, noise: Floats, periods: Floats) -> int:
+    """Add z_i += v_i in place, wrapped; returns the first row that is not finite, where it stops, or -1.
+
+    periods: (dim,) of the components, see `Sensor`.
+    """
     num, dim = measured.shape
     for i in range(num):
         for j in range(dim):
@@ -37,8 +42,7 @@ def add_noise(measured: Floats, noise: Floats, angular: Bools) -> int:
         for j in range(dim):
             if not math.isfinite(measured[i, j]):
                 return i
-            if angular[j]:
-                measured[i, j] = _on_circle(measured[i, j])
+            measured[i, j] = _within(measured[i, j], periods[j])
     return -1
 
 
@@ -72,9 +76,9 @@ def mixed_scan(measured: Floats, ids: Ints, seen: Bools, clutter: Floats, order:
 
 
 @kernel
-def examined_scan(scan: Floats, least: Floats, angular: Bools) -> tuple[int, bool, float, bool]:
-    """The first row that is not finite, or -1; whether any component is below its least value; the largest angle;
-    whether two rows begin with the same number.
+def examined_scan(scan: Floats, least: Floats, periods: Floats) -> tuple[int, bool, float, bool]:
+    """The first row that is not finite, or -1; whether any component is below its least value; the largest component
+    that repeats, in half periods; whether two rows begin with the same number.
 
     scan: rows of measurements, which may be followed by their noise (`row_noise`).
     """
@@ -85,8 +89,7 @@ def examined_scan(scan: Floats, least: Floats, angular: Bools) -> tuple[int, boo
                 return i, is_below, largest, False
         for j in range(least.shape[0]):
             is_below = is_below or scan[i, j] < least[j]
-            if angular[j]:
-                largest = max(largest, abs(scan[i, j]))
+            largest = max(largest, abs(scan[i, j]) / (0.5 * periods[j]))
     column, is_repeated = np.sort(scan[:, 0]), False
     for i in range(1, len(column)):
         is_repeated = is_repeated or column[i] == column[i - 1]

@@ -8,9 +8,9 @@ from typing import NamedTuple
 import numpy as np
 
 from vedette.kernels.base.compile import inlined, kernel
-from vedette.kernels.base.types import Bools, Floats
+from vedette.kernels.base.types import Floats
 
-_TWO_PI = 2.0 * math.pi
+FULL_TURN = 2.0 * math.pi  # period of an angle
 
 
 class Scratch(NamedTuple):
@@ -28,7 +28,7 @@ class Scratch(NamedTuple):
     innovation_cov: Floats  # (m, m)
     residual: Floats  # (m,)
     gain: Floats  # (m, n) transposed
-    angular_state: Bools  # (n,) all false: no component of a state is wrapped
+    no_periods: Floats  # (n,) inf: no component of a state is wrapped
 
 
 @kernel
@@ -47,14 +47,27 @@ def make_scratch(state_dim: int, meas_dim: int) -> Scratch:
         np.empty((meas_dim, meas_dim)),
         np.empty(meas_dim),
         np.empty((meas_dim, state_dim)),
-        np.zeros(state_dim, np.bool_),
+        np.full(state_dim, math.inf),
     )
+
+
+@inlined
+def wrap(value: float, period: float) -> float:
+    """The same value in (-period / 2, period / 2]; period inf: unchanged."""
+    half = 0.5 * period
+    if -half < value <= half:
+        return value
+    wrapped = value - period * math.floor((value + half) / period)
+    return half if wrapped <= -half else wrapped
 
 
 @inlined
 def wrap_angle(angle: float) -> float:
     """The same direction in (-pi, pi]."""
-    if -math.pi < angle <= math.pi:
-        return angle
-    wrapped = angle - _TWO_PI * math.floor((angle + math.pi) / _TWO_PI)
-    return math.pi if wrapped <= -math.pi else wrapped
+    return wrap(angle, FULL_TURN)  # type: ignore[no-any-return]
+
+
+@inlined
+def is_folded(period: float) -> bool:
+    """Return True for the period of a quantity that is measured modulo an interval, and is no angle."""
+    return period < math.inf and period != FULL_TURN

@@ -12,9 +12,9 @@ from typing import NamedTuple
 
 from vedette.errors import NumericalError
 from vedette.kernels.base.compile import borrowing
-from vedette.kernels.base.types import Bools, Floats
+from vedette.kernels.base.types import Floats
 from vedette.kernels.gaussian.linalg import cholesky
-from vedette.kernels.gaussian.scratch import wrap_angle
+from vedette.kernels.gaussian.scratch import wrap
 
 LINEARISED = 0
 UNSCENTED = 1
@@ -51,11 +51,12 @@ def fill_sigma_points(method: int, mean: Floats, cov: Floats, points: Floats, fa
 
 @borrowing
 def moments_of_images(
-    images: Floats, weights: PointWeights, dim: int, angular: Bools, mean: Floats, cov: Floats
+    images: Floats, weights: PointWeights, dim: int, periods: Floats, mean: Floats, cov: Floats
 ) -> None:
     """Weighted mean and covariance of the images; they are left as deviations from the mean.
 
-    Angles are averaged as deviations from the first image, so that a cloud across +-pi has its mean inside the cloud.
+    Components with a period, such as angles, are averaged as deviations from the first image, so that a cloud across
+    +-pi has its mean inside the cloud.
     """
     num, first, other = weights.num, weights.first, weights.other
     for j in range(dim):
@@ -63,12 +64,10 @@ def moments_of_images(
         total = 0.0
         for i in range(num):
             # Relative to an image in the cloud, angles need no circular mean.
-            images[i, j] -= base
-            if angular[j]:
-                images[i, j] = wrap_angle(images[i, j])
+            images[i, j] = wrap(images[i, j] - base, periods[j])
             if i > 0:
                 total += other * images[i, j]
-        mean[j] = wrap_angle(base + total) if angular[j] else base + total
+        mean[j] = wrap(base + total, periods[j])
         for i in range(num):
             images[i, j] -= total
     for a in range(dim):

@@ -162,7 +162,7 @@ def fill_expected_changes(
     P_D is that of the prediction, even if earlier scans of the horizon are expected to have reduced its covariance.
     """
     dim, size = belief.paths.means.shape[2], bases.shape[1]
-    work = _make_work(dim, len(decision.sensor.angular))
+    work = _make_work(dim, len(decision.sensor.periods))
     cov, information, detections = np.empty((dim, dim)), np.empty((dim, dim)), np.empty(belief.paths.means.shape[1])
     for course in range(first, last):
         for entry in range(entries.first[course], entries.last[course]):

@@ -12,7 +12,7 @@ from vedette.kernels.base.bundle_types import typed_by_fields
 from vedette.kernels.base.compile import borrowing, inlined, kernel
 from vedette.kernels.base.types import Bools, Floats, Ints, Lmb, Motion, Sensor
 from vedette.kernels.gaussian.linalg import cholesky
-from vedette.kernels.gaussian.scratch import Scratch, wrap_angle
+from vedette.kernels.gaussian.scratch import Scratch, wrap
 from vedette.kernels.planning.batched_models import ModelForms
 
 IDEAL = 0
@@ -84,8 +84,7 @@ def add_noise(sensor: Sensor, state: Floats, pose: Floats, normals: Floats, scra
     for a in range(out.shape[0]):
         for b in range(a + 1):
             out[a] += factor[a, b] * normals[b]
-        if sensor.angular[a]:
-            out[a] = wrap_angle(out[a])
+        out[a] = wrap(out[a], sensor.periods[a])
 
 
 @inlined

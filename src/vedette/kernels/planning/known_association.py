@@ -22,7 +22,7 @@ from vedette.kernels.base.compile import borrowing, inlined, kernel
 from vedette.kernels.base.elementary import exponentials, logs, logs_of_one_and
 from vedette.kernels.base.types import Bools, Floats, Ints
 from vedette.kernels.gaussian.information import to_information
-from vedette.kernels.gaussian.scratch import wrap_angle
+from vedette.kernels.gaussian.scratch import wrap
 from vedette.kernels.planning.batched_ekf import (
     BatchedGaussians,
     BatchWork,
@@ -175,12 +175,13 @@ def _whiten(decision: Decision, num: int, work: Work) -> None:
         residuals, predicted, away = work.measurements[a], batch.predicted[a], 0
         for s in range(num):
             residuals[s] -= predicted[s]
-        if decision.sensor.angular[a]:
+        half = 0.5 * decision.sensor.periods[a]
+        if half < math.inf:
             for s in range(num):
-                away += 0 if -math.pi < residuals[s] <= math.pi else 1
+                away += 0 if -half < residuals[s] <= half else 1
             if away > 0:
                 for s in range(num):
-                    residuals[s] = residuals[s] if work.own.bends[s] else wrap_angle(residuals[s])
+                    residuals[s] = residuals[s] if work.own.bends[s] else wrap(residuals[s], 2.0 * half)
         for k in range(a):
             factors, others = batch.factor[place(a, k)], work.measurements[k]
             for s in range(num):
@@ -333,7 +334,7 @@ def fill_changes(
     references: (num_labels, state_dim) reference points of the rows. bases: (num_labels, bernoulli_size) the sensor's
     rows without scans. Both in the order of the sensor's own labels.
     """
-    dim, meas_dim, num_samples = references.shape[1], len(decision.sensor.angular), belief.targets.shape[1]
+    dim, meas_dim, num_samples = references.shape[1], len(decision.sensor.periods), belief.targets.shape[1]
     room = min(num_samples, _MOST_LANES)
     work, found, row = _make_work(dim, meas_dim, room), _make_followed(dim, room), np.empty(bases.shape[1])
     for course in range(first, last):
@@ -350,7 +351,7 @@ def pseudo_update_known(belief: Belief, decision: Decision, first: int, last: in
     """Write densities of courses `first:last` of one sensor for every sample: case `course * num_samples + sample`."""
     tracks, num_samples = belief.prior.tracks, belief.targets.shape[1]
     dim, room = tracks.components.means.shape[1], min(num_samples, _MOST_LANES)
-    work, found = _make_work(dim, len(decision.sensor.angular), room), _make_followed(dim, room)
+    work, found = _make_work(dim, len(decision.sensor.periods), room), _make_followed(dim, room)
     for course in range(first, last):
         for label in range(len(tracks.labels)):
             for start in range(0, num_samples, _MOST_LANES):

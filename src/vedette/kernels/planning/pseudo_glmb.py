@@ -150,7 +150,7 @@ def pseudo_update_glmb(
     belief = CaseBelief(prior.tracks, Parents(prior.hyp_offsets, prior.hyp_tracks, prior.hyp_log_weights), groups)
     num_tracks, dim = prior.tracks.components.means.shape
     num_sets, most = len(results.set_offsets) - 1, most_targets(decision.futures)
-    work = make_work(num_tracks, num_sets, dim, len(decision.sensor.angular), most)
+    work = make_work(num_tracks, num_sets, dim, len(decision.sensor.periods), most)
     while first < last:
         first = _update_cases(belief, decision, first, last, results, work)
         if first < last:

@@ -147,7 +147,7 @@ def pseudo_update_lmb(
 
     prior: one Gaussian per track. association: used instead of the sums over clusters.
     """
-    work = _make_work(prior, len(decision.sensor.angular), most_targets(decision.futures))
+    work = _make_work(prior, len(decision.sensor.periods), most_targets(decision.futures))
     while first < last:
         first = _update_cases(prior, decision, association, first, last, results, work)
         if first < last:

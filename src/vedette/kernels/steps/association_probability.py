@@ -25,8 +25,8 @@ def prob_explained(belief: Lmb, scan: ScanInput, sensor: Sensor, truncation: Tru
     sum over labels of r <p, p_D g(z | .)> / (kappa(z) + the same sum).
     """
     seen = marked(belief, in_view(belief.tracks, scan, sensor, truncation))
-    rows = standing_rows(seen.tracks, len(sensor.angular))
-    expect_rows(sensor, scan, rows, make_scratch(belief.tracks.components.means.shape[1], len(sensor.angular)))
+    rows = standing_rows(seen.tracks, len(sensor.periods))
+    expect_rows(sensor, scan, rows, make_scratch(belief.tracks.components.means.shape[1], len(sensor.periods)))
     weigh_by_existence(seen.existence_logit, rows)
     options, _, _ = weighed_options(rows, scan, sensor, truncation)
     odds = np.zeros(len(scan.measurements))

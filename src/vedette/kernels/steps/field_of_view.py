@@ -43,7 +43,7 @@ def _may_change(
     """
     mean, noise = tracks.components.means[c], scratch.measurement_noise
     chance = detection_probability(sensor, scan.pose, mean, tracks.components.covs[c], scratch.points[0])
-    if chance == 0.0 or chance > _NOTHING or scan.measurements.shape[1] > len(sensor.angular):
+    if chance == 0.0 or chance > _NOTHING or scan.measurements.shape[1] > len(sensor.periods):
         return chance > 0.0
     if least_log_clutter == math.inf:
         return False
@@ -58,7 +58,7 @@ def _may_change(
 def in_view(tracks: Tracks, scan: ScanInput, sensor: Sensor, truncation: Truncation) -> Bools:
     """Mask of the tracks that the scan may change, shape (num_tracks,)."""
     marks = np.zeros(len(tracks.labels), np.bool_)
-    scratch = make_scratch(tracks.components.means.shape[1], len(sensor.angular))
+    scratch = make_scratch(tracks.components.means.shape[1], len(sensor.periods))
     least_log_clutter = _least_log_clutter(scan, sensor, truncation.log_clutter_floor)
     for i in range(len(marks)):
         for c in range(tracks.offsets[i], tracks.offsets[i + 1]):

@@ -154,7 +154,7 @@ def extend_combinations(
     combinations: Combinations, at: int, shift: int, scan: ScanInput, sensor: Sensor, truncation: Truncation
 ) -> tuple[Combinations, SensorReport]:
     """Return the combinations after the scan of sensor `at`, whose measurements are counted from `shift` on."""
-    given, meas_dim = combinations.rows, len(sensor.angular)
+    given, meas_dim = combinations.rows, len(sensor.periods)
     rows = Rows(
         given.labels,
         given.offsets,

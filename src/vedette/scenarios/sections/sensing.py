@@ -136,6 +136,10 @@ def clutter_findings(measurement: Measurement, clutter: Clutter, path: Path) -> 
     if clutter.kind == "around_sensor" and (kind not in PLACED or kind in HEIGHT_DEPENDENT):
         wanted = f"region, measurement_space or custom clutter for a {kind} measurement"
         yield path, wanted if kind != "custom" else wanted.replace("region, ", ""), "around_sensor clutter"
+    folded = getattr(measurement, "max_unambiguous_range_rate", None)
+    most = getattr(clutter, "max_range_rate", None)
+    if folded is not None and most is not None and most > folded:
+        yield (*path, "max_range_rate"), f"at most {folded:g}, where range rates are folded", describe(most)
 
 
 def clutter_box_findings(measurement: Measurement, clutter: Clutter, path: Path) -> Iterator[Finding]:

@@ -37,11 +37,11 @@ def build_parts(section: Any, like: Measurement, region: Region, folder: Path, k
     """
     model = known if section.measurement is None else section.measurement.build(folder)
     given = {"measurement": model, "angular": model.angular, "kind": like.kind, "region": region}
-    parts = {
-        name: part.build(folder, **given)
-        for name in ("noise", "detection", "clutter")
-        if (part := getattr(section, name)) is not None
-    }
+    found = {name: part for name in ("noise", "detection", "clutter") if (part := getattr(section, name)) is not None}
+    folded = getattr(like, "max_unambiguous_range_rate", None)
+    if folded is not None and getattr(found.get("clutter"), "max_range_rate", folded) is None:
+        found["clutter"] = found["clutter"].model_copy(update={"max_range_rate": folded})
+    parts = {name: part.build(folder, **given) for name, part in found.items()}
     return {"measurement": model, **parts}
 
 
