@@ -7,7 +7,8 @@
 A scene has six targets of 5 to 25 m/s within 8 km of a radar that scans every 4 s for 240 s; P_D .9, eight false plots
 a scan. Each plot has standard deviations of its own, from .002 to .04 rad and from 10 to 300 m, log-uniformly, and a
 signal-to-noise ratio: of targets that fluctuate about 16 dB, of noise, both above 10 dB. "Clutter of 3 dB" has twice
-the power of the noise; the model knows that (`clutter_db`) or does not. Tracked by the radar's mean noise, by each
+the power of the noise; the model knows that (`clutter_db`) or does not. "Own heading" is wrong by another angle in each
+scan, for plots of .003 rad and 20 m. Tracked by the radar's mean noise, by each
 plot's own, and with the ratios. The last rows are five aircraft at 3 to 9 km seen by one radar whose plots have an
 altitude with the given probability. Prints OSPA (c = 500 m) or the mean error of the estimates within 2 km, its worst
 scene, the number of tracks that last ten scans (six and five are right), and the median squared error of the position
@@ -47,6 +48,7 @@ class Variant(NamedTuple):
     signal: bool = False
     clutter_power: float = 1.0
     known_power_db: float = 0.0
+    heading_std: float = 0.0  # rad, of the own heading in each scan, with plots of .003 rad and 20 m
 
 
 ALL = ("bearing_std_rad", "range_std_m", "snr_db")
@@ -57,6 +59,8 @@ VARIANTS = [
     Variant("the same, clutter of 3 dB, known", ALL, True, 2.0, 3.0),
     Variant("the same, clutter of 3 dB, taken for noise", ALL, True, 2.0),
     Variant("each plot's noise, clutter of 3 dB", ALL[:2], False, 2.0),
+    Variant("own heading off by 1.5 deg, not told", ALL[:2], heading_std=math.radians(1.5)),
+    Variant("own heading off by 1.5 deg, told", (*ALL[:2], "own_heading_std_deg"), heading_std=math.radians(1.5)),
 ]
 
 
@@ -73,23 +77,27 @@ class Ships:
         return np.asarray(self.starts + time * self.velocities)
 
 
-def plots(ships: Ships, rng: np.random.Generator, clutter_power: float) -> list[dict[str, float]]:
+def plots(ships: Ships, rng: np.random.Generator, variant: Variant) -> list[dict[str, float]]:
     """All plots of a scene, by columns."""
+    heading_std = variant.heading_std
+    stds = ((0.003, 0.003), (20.0, 20.0)) if heading_std else STDS
     found = list[dict[str, float]]()
     threshold, mean = 10.0 ** (SIGNAL.threshold_db / 10.0), 10.0 ** (SIGNAL.mean_db / 10.0)
     for k in range(SCANS):
         time = PERIOD * k
+        turned = heading_std * rng.normal() if heading_std else 0.0
         true = ships.at(time)[rng.uniform(size=6) < DETECTION]
         false = rng.uniform(-10e3, 10e3, (rng.poisson(FALSE), 2))
-        for (x, y), power in [(each, 1.0 + mean) for each in true] + [(each, clutter_power) for each in false]:
-            bearing_std, range_std = (math.exp(rng.uniform(*np.log(each))) for each in STDS)
+        for (x, y), power in [(each, 1.0 + mean) for each in true] + [(each, variant.clutter_power) for each in false]:
+            bearing_std, range_std = (math.exp(rng.uniform(*np.log(each))) for each in stds)
             found.append(
                 {
                     "time": time,
-                    "bearing_rad": math.atan2(y, x) + bearing_std * rng.normal(),
+                    "bearing_rad": math.atan2(y, x) + turned + bearing_std * rng.normal(),
                     "range_m": abs(math.hypot(x, y) + range_std * rng.normal()) + 1.0,
                     "bearing_std_rad": bearing_std,
                     "range_std_m": range_std,
+                    "own_heading_std_deg": math.degrees(heading_std),
                     "snr_db": 10.0 * math.log10(threshold + rng.exponential(power)),
                 }
             )
@@ -119,7 +127,7 @@ def of_ships(folder: Path, seed: int, variant: Variant) -> Floats:
     """(3,) OSPA, m; number of lasting tracks; median squared error of position."""
     rng = np.random.default_rng(seed)
     ships = Ships(rng)
-    rows = [dict[str, float | str](row) for row in plots(ships, rng, variant.clutter_power)]
+    rows = [dict[str, float | str](row) for row in plots(ships, rng, variant)]
     powers = f"mean_db: {SIGNAL.mean_db}, threshold_db: {SIGNAL.threshold_db}, clutter_db: {variant.known_power_db}"
     signal = f", signal: {{{powers}}}" * variant.signal
     sensor = (

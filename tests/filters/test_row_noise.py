@@ -76,6 +76,15 @@ def test_a_correlated_row_updates_as_a_kalman_filter(kind: Any) -> None:
     np.testing.assert_allclose(tracks.covs[heaviest], cov - gain @ cov[:2], rtol=1e-9, atol=1e-9)
 
 
+@every_kind
+@pytest.mark.parametrize(("scan", "stds", "parts"), [(SCAN, [1.0, 7.0], {}), (POLAR, [0.1, 5.0], polar())])
+def test_what_is_added_to_the_noise_of_the_model_is_another_model(kind: Any, scan: Any, stds: Any, parts: Any) -> None:
+    rows = with_row_noise(scan, np.zeros((3, 2)), added=np.tile(0.75 * np.diag(np.square(stds)), (3, 1, 1)))
+    half = np.multiply(0.5, stds)
+    belief, other = (make(kind, **(parts | {"noise": models.constant_noise(each)})) for each in (half, stds))
+    close(step(belief, rows)[0], step(other, scan)[0])
+
+
 @pytest.mark.parametrize("kind", [*LABELLED, *CENTRAL])
 def test_a_likelihood_ratio_divides_the_clutter(kind: Any) -> None:
     """Ten times as probable of a target is a tenth of the clutter, and of no other measurement."""
@@ -146,6 +155,6 @@ def test_a_filter_refuses_rows_of_another_length_and_bad_noise() -> None:
     with pytest.raises(InputError, match="shape"):
         step(filter, np.zeros((3, 4)))
     rows = with_row_noise(SCAN, np.ones((3, 2)))
-    rows[1, 2] = -1.0
+    rows[1, 3] = 5.0
     with pytest.raises(InputError, match=r"positive definite .* row 1"):
         step(filter, rows)

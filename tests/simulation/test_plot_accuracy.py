@@ -24,6 +24,7 @@ from vedette.models import (
     with_row_noise,
 )
 from vedette.models.functions import numbers_at
+from vedette.models.pose_noise import PoseStds, pose_noise
 from vedette.recorded import Conventions, Origin, RecordedSensor, parse_scans
 from vedette.recorded.merging import merged
 from vedette.recorded.tables import as_table
@@ -201,3 +202,63 @@ def test_clutter_of_rows_without_a_component_has_the_density_of_the_others(clutt
     rows = with_row_noise(np.column_stack([scan, np.full(3, np.nan)]), np.zeros((3, 3)))
     found = numbers_at(clutter.log_intensity, rows, np.zeros(3), clutter.params)
     np.testing.assert_allclose(found, without.log_intensity_at(scan, np.zeros(3)), rtol=1e-12)
+
+
+POSES = ROWS | {
+    "own_x_std_m": [30.0, 30.0, None],
+    "own_y_std_km": [0.04, "", None],
+    "own_heading_std_deg": [1.5, 1.5, 1.5],
+}
+
+
+def test_errors_of_the_own_pose_add_to_the_noise() -> None:
+    first, _ = scans_of(POSES)
+    stds = [[math.radians(1.0), 50.0], [math.radians(2.0), 0.0]]
+    measured = [[0.5, 1000.0], [1.0, 2000.0]]
+    poses = [PoseStds(30.0, 40.0, math.radians(1.5)), PoseStds(30.0, 0.0, math.radians(1.5))]
+    added = [
+        pose_noise(row, ("bearing", "range"), (0.0, 0.0, 0.0), own) for row, own in zip(measured, poses, strict=True)
+    ]
+    np.testing.assert_allclose(first, with_row_noise(measured, stds, added=added), rtol=1e-12)
+    # By hand, of the first row: along and across the line of sight.
+    along = math.hypot(30.0 * math.cos(0.5), 40.0 * math.sin(0.5))
+    assert first[0, 4] == pytest.approx(50.0**2 + along**2)
+    across = math.hypot(30.0 * math.sin(0.5), 40.0 * math.cos(0.5)) / 1000.0
+    assert first[0, 2] == pytest.approx(math.radians(1.0) ** 2 + math.radians(1.5) ** 2 + across**2)
+
+
+def test_bad_accuracy_of_the_own_pose_is_named() -> None:
+    with pytest.raises(InputError, match=r"row 1, column .own_x_std_m.: expected a standard deviation above 0"):
+        scans_of(POSES | {"own_x_std_m": [-1.0, 30.0, None]})
+    with pytest.raises(InputError, match=r"row 1, column .own_heading_std_deg.: expected a number from"):
+        scans_of(POSES | {"own_heading_std_deg": [200.0, 1.5, None]})
+    place = {"time": [0.0], "x": [1.0], "y": [5.0], "own_x_std_m": [4.0]}
+    recording = parse_scans(as_table(place), [replace(RADAR, kind="position")], EAST)
+    assert recording.unused == ("own_x_std_m",)
+
+
+def test_lines_have_standard_deviations_of_the_pose() -> None:
+    given = line(pose_stds={"x": 30.0, "heading_deg": 1.5})
+    scan = read_message(given, "line 1", [RADAR], Conventions({}, {})).scan.measurements
+    measured, own = [[0.5, 1000.0], [1.0, 2000.0]], PoseStds(x=30.0, heading=math.radians(1.5))
+    added = [pose_noise(row, ("bearing", "range"), (0.0, 0.0, 0.0), own) for row in measured]
+    np.testing.assert_allclose(scan, with_row_noise(measured, np.zeros((2, 2)), added=added), rtol=1e-12)
+    empty = line(pose_stds={"x": 30.0}, measurements=[])
+    assert len(read_message(empty, "line 1", [RADAR], Conventions({}, {})).scan.measurements) == 0
+
+
+@pytest.mark.parametrize(
+    ("given", "expected"),
+    [
+        ({"heading": 1.5}, "pose_stds: expected keys among heading_deg, x, y"),
+        ({"x": 0.0}, "pose_stds.x: expected a number above 0"),
+        ({"x": "3"}, "pose_stds.x: expected a number above 0"),
+        (3.0, "pose_stds: expected keys among"),
+    ],
+)
+def test_bad_standard_deviations_of_the_pose_are_named(given: Any, expected: str) -> None:
+    with pytest.raises(InputError, match=expected):
+        read_message(line(pose_stds=given), "line 1", [RADAR], Conventions({}, {}))
+    place = replace(RADAR, kind="position")
+    with pytest.raises(InputError, match="pose_stds: expected none, as measurements of 'R' do not depend on its pose"):
+        read_message(line(pose_stds=given), "line 1", [place], Conventions({}, {}))

@@ -3,18 +3,19 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from vedette.errors import InputError
-from vedette.internal.quantities import COMPONENTS, is_doppler
+from vedette.internal.quantities import COMPONENTS, HEIGHT_DEPENDENT, is_doppler
 from vedette.internal.reading import error_summary, parse_json
 from vedette.internal.text import pluralise, shown
 from vedette.kernels.base.types import BEAM, OWN_VELOCITY, Floats
 from vedette.models.arguments import reject
+from vedette.models.pose_noise import pose_stds_of
 from vedette.models.turns import Turn, with_beam
 from vedette.recorded import Conventions, Origin, RecordedSensor, parse_scans
 from vedette.recorded.conventions import GAPS
@@ -24,7 +25,7 @@ from vedette.tracking import SensorScan
 
 MAX_LINE_BYTES = 1_000_000  # per line
 MAX_MEASUREMENTS = 2000  # per scan
-_KEYS = ("sensor", "time", "measurements", "pose", "velocity", "times", "stds", "snr_db")
+_KEYS = ("sensor", "time", "measurements", "pose", "velocity", "times", "stds", "snr_db", "pose_stds")
 
 
 def is_message(line: bytes) -> bool:
@@ -57,7 +58,8 @@ def read_message(
     velocity in m/s. For a sensor that turns, `"times"` has the time of each measurement, and `time` is the middle of
     the turn; without `"times"`, all measurements are of one time. `"stds"` has a row of standard deviations for each
     measurement, in its units, null where the sensor's noise model holds; `"snr_db"` the signal-to-noise ratio of each
-    measurement of a sensor with `signal`, or null.
+    measurement of a sensor with `signal`, or null. `"pose_stds"` has standard deviations of the pose, `{"x": , "y": ,
+    "heading_deg": , "height": , "vx": , "vy": }`, each optional.
 
     Args:
         line: line of UTF-8 text.
@@ -85,13 +87,14 @@ def read_message(
     columns |= {name: [row[j] for row in rows] if rows else [None] for j, name in enumerate(names)}
     columns |= {name: [value] * num for name, value in pose.items()}
     columns |= _accuracy(data, len(rows), site, place)
+    columns |= {name: [std] * num for name, std in _pose_stds(data.get("pose_stds"), f"{place}, pose_stds", site)}
     unit = "deg" if site.compass else "rad"
     units = {
         "bearing": unit,
         "elevation": unit,
         **{name: unit for name, unit in conventions.units.items() if name in names},
     }
-    units |= {f"{name}_std": units[name] for name in names if name in units}
+    units |= {f"{name}_std": units[name] for name in names if name in units} | {"own_heading_std": "deg"}
     column_names = {_POSE_COLUMNS[name]: name for name in pose}
     # The loop removes measurements beyond the reach, and counts them.
     unlimited_site = replace(site, reach=math.inf, turn="none")
@@ -231,6 +234,22 @@ def _pose(given: Any, field: str, site: RecordedSensor) -> tuple[dict[str, float
         wanted = "[x, y, heading_rad" + (", ...]" if len(site.pose) > 3 else "]")
         raise reject(field, f"numbers {wanted}, or lon and lat", given)
     return dict(zip(("pose.x", "pose.y", "pose.heading_rad"), given, strict=False)), given[3:]
+
+
+def _pose_stds(given: Any, field: str, site: RecordedSensor) -> Iterator[tuple[str, float]]:
+    """Yield standard deviations of the pose as columns of a table: their names and values."""
+    fields = pose_stds_of(COMPONENTS[site.kind], site.kind in HEIGHT_DEPENDENT)
+    names = {{"heading": "heading_deg"}.get(each, each): each for each in fields}
+    if given is None:
+        return
+    if not names:
+        raise reject(field, f"none, as measurements of {shown(site.name)} do not depend on its pose", given)
+    if not isinstance(given, dict) or not given or not set(given) <= set(names):
+        raise reject(field, f"keys among {', '.join(names)}", given)
+    for name, std in given.items():
+        if not (_is_number(std) and std > 0.0):
+            raise reject(f"{field}.{name}", "a number above 0", std)
+        yield f"own_{names[name]}_std", std
 
 
 def _velocity(given: Any, field: str, site: RecordedSensor) -> dict[str, float]:

@@ -19,7 +19,12 @@ LOG_RATIO_OF_MISSING = 0.5 * math.log(2.0 * math.pi * MISSING)  # makes up for t
 _STRONG_CLUTTER = 1e-3  # share of false measurements with the signal of a target
 
 
-def with_row_noise(measurements: ArrayLike, covs: ArrayLike, log_likelihood_ratios: ArrayLike | None = None) -> Floats:
+def with_row_noise(
+    measurements: ArrayLike,
+    covs: ArrayLike,
+    log_likelihood_ratios: ArrayLike | None = None,
+    added: ArrayLike | None = None,
+) -> Floats:
     """Return a scan whose measurements bring their noise, (num, m + m (m + 1) / 2 + 1), as all filters take it.
 
     Args:
@@ -28,6 +33,8 @@ def with_row_noise(measurements: ArrayLike, covs: ArrayLike, log_likelihood_rati
             component to the sensor's noise model.
         log_likelihood_ratios: (num,) log ratio of the probability densities of a measurement's features, such as its
             signal-to-noise ratio, if it is of a target and if it is false; None: 0.
+        added: (num, m, m) covariances in addition to those, or to the sensor's noise model where it holds, such as
+            those of the sensor's own pose; None: 0.
 
     Raises:
         InputError: an array of another shape, a number that is not finite, a covariance that is not symmetric and
@@ -42,8 +49,11 @@ def with_row_noise(measurements: ArrayLike, covs: ArrayLike, log_likelihood_rati
         given = float_array("covs", given, (num, dim))
         given = given[:, :, np.newaxis] ** 2 * np.eye(dim)
     given = float_array("covs", given, (num, dim, dim)).copy()
-    if not np.array_equal(given, given.swapaxes(1, 2)):
-        raise InputError("covs: expected symmetric covariances; got others")
+    more = np.zeros(given.shape) if added is None else float_array("added", added, (num, dim, dim))
+    for name, each in (("covs", given), ("added", more)):
+        if not np.array_equal(each, each.swapaxes(1, 2)) or (np.diagonal(each, axis1=1, axis2=2) < 0.0).any():
+            raise InputError(f"{name}: expected symmetric positive definite covariances; got others")
+    given = _sum(given, more)
     ratios = np.zeros(num) if log_likelihood_ratios is None else log_likelihood_ratios
     first, second = np.tril_indices(dim)
     ratios = float_array("log_likelihood_ratios", ratios, (num,)).copy()
@@ -96,18 +106,37 @@ class SignalModel:
 
 
 def row_noise(
-    stds: Sequence[float], missing: Sequence[bool], *, correlation: float = 0.0, log_likelihood_ratio: float = 0.0
+    stds: Sequence[float],
+    missing: Sequence[bool],
+    *,
+    correlation: float = 0.0,
+    log_likelihood_ratio: float = 0.0,
+    added: Floats | None = None,
 ) -> tuple[float, ...]:
     """Return what follows a measurement in its row, as in `with_row_noise`.
 
     stds: of each component, 0 for that of the sensor's noise model. missing: of each component, True if it was not
-    measured. correlation: of the first two components.
+    measured. correlation: of the first two components. added: (m, m) covariance in addition to these, or to that of the
+    noise model.
     """
     own = [math.sqrt(MISSING) if gap else std for std, gap in zip(stds, missing, strict=True)]
     covs = [own[a] * own[b] if a == b else 0.0 for a in range(len(own)) for b in range(a + 1)]
     if correlation:
         covs[1] = correlation * own[0] * own[1]
+    if added is not None:
+        places, own_covs = np.tril_indices(len(own)), np.zeros((1, len(own), len(own)))
+        own_covs[0][places] = covs
+        more = np.where(np.logical_or.outer(missing, missing), 0.0, added)
+        covs = _sum(own_covs, more[np.newaxis])[0][places].tolist()
     return (*covs, LOG_RATIO_OF_MISSING * sum(missing) + log_likelihood_ratio)
+
+
+def _sum(covs: Floats, added: Floats) -> Floats:
+    """Return covariances (num, m, m) with others added; a variance left to the noise model is minus what is added."""
+    total = covs + added
+    for a in range(covs.shape[1]):
+        total[:, a, a] = np.where(covs[:, a, a] > 0.0, total[:, a, a], -added[:, a, a])
+    return total
 
 
 def measured_part(scan: Floats, meas_dim: int) -> Floats:
@@ -129,14 +158,13 @@ def _replaced(scan: Floats, covs: Floats) -> Floats:
 
 
 def check_row_noise(place: str, scan: Floats, meas_dim: int) -> None:
-    """Raise `InputError` unless the covariances that rows bring are positive definite (variances of 0 are left out)."""
+    """Raise `InputError` unless the covariances that rows bring are positive definite with a noise model of 1."""
     if not len(scan):
         return
     covs = noise_of_rows(scan, np.tile(np.eye(meas_dim), (len(scan), 1, 1)))
     stds = np.sqrt(np.maximum(np.diagonal(covs, axis1=1, axis2=2), np.finfo(np.float64).tiny))
     correlations = covs / (stds[:, :, np.newaxis] * stds[:, np.newaxis])
-    diagonal = meas_dim + np.cumsum(np.arange(1, meas_dim + 1)) - 1
-    wrong = (np.linalg.eigvalsh(correlations)[:, 0] <= 0.0) | (scan[:, diagonal] < 0.0).any(axis=1)
+    wrong = np.linalg.eigvalsh(correlations)[:, 0] <= 0.0
     if wrong.any():
         row = int(np.argmax(wrong))
         got = scan[row, meas_dim:-1].tolist()

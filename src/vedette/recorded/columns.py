@@ -11,6 +11,7 @@ from vedette.internal.quantities import ANGLES, COMPONENTS, HEIGHT_DEPENDENT, is
 from vedette.internal.text import shown
 from vedette.kernels.base.types import Floats
 from vedette.models.arguments import reject
+from vedette.models.pose_noise import pose_stds_of
 from vedette.platforms.compass import PlaneCompass
 from vedette.recorded.conventions import GAPS, OTHER_NAMES, OWN_SPEEDS, UNITS, Conventions
 from vedette.recorded.geography import Origin
@@ -77,6 +78,7 @@ class ScanColumns:
         if {"x_std", "y_std"} <= set(self._columns):
             names += ["xy_correlation"] * is_position(site.kind)
         names += ["snr"] * (site.signal is not None)
+        names += [f"own_{each}_std" for each in pose_stds_of(COMPONENTS[site.kind], site.kind in HEIGHT_DEPENDENT)]
         own = tuple(name for name in names if name in self._columns)
         has_gaps = any(self._has_gaps(name) for name in COMPONENTS[site.kind] if name in GAPS)
         return own if own or has_gaps else None

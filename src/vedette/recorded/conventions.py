@@ -26,6 +26,12 @@ UNITS: dict[str, Mapping[str, float]] = {
     "own_vy": SPEEDS,
     "own_height": HEIGHTS,
     **{f"{name}_std": each.units for name, each in QUANTITIES.items()},
+    "own_x_std": LENGTHS,
+    "own_y_std": LENGTHS,
+    "own_heading_std": ANGLES,
+    "own_height_std": HEIGHTS,
+    "own_vx_std": SPEEDS,
+    "own_vy_std": SPEEDS,
     "xy_correlation": {"": 1.0},
     "snr": {"db": 1.0},
 }
@@ -52,6 +58,7 @@ MOST = {
     **dict.fromkeys(OWN_SPEEDS, QUANTITIES["range_rate"].most),
     **{name: each.most for name, each in QUANTITIES.items() if each.most < math.inf},
     **{f"{name}_std": math.pi for name, each in QUANTITIES.items() if each.is_angle},
+    "own_heading_std": math.pi,
     "xy_correlation": 1.0,
     "snr": 200.0,
 }

@@ -22,6 +22,7 @@ from vedette.internal.quantities import (
 from vedette.internal.text import shown
 from vedette.kernels.base.types import OWN_HEIGHT, OWN_VELOCITY, Floats
 from vedette.models.bias import NO_BIAS
+from vedette.models.pose_noise import PoseStds, pose_noise
 from vedette.models.row_noise import row_noise
 from vedette.recorded.columns import ScanColumns
 from vedette.recorded.conventions import (
@@ -175,18 +176,19 @@ class _Rows(ScanColumns):
             return None
         if quantities[0] == "lon":
             place = self._agreed(i, self._plane(i, "lon", "lat"), "x", "y")
-            return (*place, *(self._third(i, quantity) for quantity in quantities[2:]), *self._row_noise(i, s))
-        measured = (
-            self._angle(i, quantity, s, pose) if quantity == "bearing" else self._third(i, quantity)
-            for quantity in quantities
-        )
-        return (*measured, *self._row_noise(i, s))
+            measured = [*place, *(self._third(i, quantity) for quantity in quantities[2:])]
+        else:
+            measured = [
+                self._angle(i, quantity, s, pose) if quantity == "bearing" else self._third(i, quantity)
+                for quantity in quantities
+            ]
+        return (*measured, *self._row_noise(i, s, measured, pose))
 
     def _third(self, i: int, quantity: str) -> float:
         """Return a measured value; of a third component that the row does not have, what stands in for it."""
         return GAPS[quantity] if quantity in GAPS and self._is_blank(i, quantity) else self._value(i, quantity)
 
-    def _row_noise(self, i: int, s: int) -> tuple[float, ...]:
+    def _row_noise(self, i: int, s: int, measured: Sequence[float], pose: Sequence[float]) -> tuple[float, ...]:
         """Return covariance and log likelihood ratio of a row in the order of `row_noise`; () for rows without them."""
         own, signal = self.accuracy[s], self.sites[s].signal
         if own is None:
@@ -201,7 +203,9 @@ class _Rows(ScanColumns):
             correlation = self._correlation(i)
         if signal is not None and "snr" in own and not self._is_blank(i, "snr"):
             ratio = signal.log_likelihood_ratio(self._value(i, "snr"))
-        return row_noise(stds, missing, correlation=correlation, log_likelihood_ratio=ratio)
+        of_pose = {name: self._std(i, f"own_{name}_std") for name in PoseStds._fields if f"own_{name}_std" in own}
+        added = pose_noise(measured, names, pose, PoseStds(**of_pose)) if of_pose else None
+        return row_noise(stds, missing, correlation=correlation, log_likelihood_ratio=ratio, added=added)
 
     def _is_blank(self, i: int, quantity: str) -> bool:
         return is_empty(self.table.columns[self._columns[quantity][0]][i])

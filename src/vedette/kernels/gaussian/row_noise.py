@@ -2,9 +2,10 @@
 
 The rows of such a scan are longer than a measurement of m components: behind these stand the lower triangle of the
 covariance of the row's noise, row by row, and the log likelihood ratio of its features (target over clutter), such as
-a signal-to-noise ratio. A variance of 0 leaves the component to the sensor's noise model. With a variance of `MISSING`
-a component was not measured; the likelihood ratio then makes up for the density of so wide a Gaussian, and clutter has
-the density of the other components.
+a signal-to-noise ratio. A variance of 0 leaves the component to the sensor's noise model. One below 0 is minus a
+variance that is added to that of the noise model, such as the error of the sensor's own pose. With a variance of
+`MISSING` a component was not measured; the likelihood ratio then makes up for the density of so wide a Gaussian, and
+clutter has the density of the other components.
 """
 
 from __future__ import annotations
@@ -42,21 +43,22 @@ def is_missing(measurement: Floats, component: int, meas_dim: int) -> bool:
 def replace_noise(measurement: Floats, noise: Floats) -> None:
     """Write a measurement's own covariance over that of the noise model (m, m), for the components that have one.
 
-    Components with a noise of their own are uncorrelated with the others.
+    Components with a noise of their own are uncorrelated with those of the model. Variances below 0 are added.
     """
     m = noise.shape[0]
     if not has_own_noise(measurement, m):
         return
     for a in range(m):
         for b in range(a + 1):
-            own = measurement[place_of_variance(a, m)] > 0.0
-            also = measurement[place_of_variance(b, m)] > 0.0
-            if own and also:
-                noise[a, b] = measurement[place_of_variance(a, m) - a + b]
-                noise[b, a] = noise[a, b]
-            elif own or also:
-                noise[a, b] = 0.0
-                noise[b, a] = 0.0
+            own, also = measurement[place_of_variance(a, m)], measurement[place_of_variance(b, m)]
+            given = measurement[place_of_variance(a, m) - a + b]
+            if own < 0.0 and also < 0.0:
+                given = noise[a, b] + (abs(given) if a == b else given)
+            elif own <= 0.0 and also <= 0.0:
+                given = noise[a, b]
+            elif own == 0.0 or also == 0.0:
+                given = 0.0
+            noise[a, b], noise[b, a] = given, given
 
 
 @inlined
