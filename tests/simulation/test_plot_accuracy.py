@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import csv
 import json
 import math
 from dataclasses import replace
@@ -13,6 +14,8 @@ import pytest
 from scipy.stats import expon
 
 from vedette.errors import InputError
+from vedette.evaluation import track_recording
+from vedette.evaluation.scans import scan_table
 from vedette.live.messages import read_message
 from vedette.models import (
     Bias,
@@ -262,3 +265,43 @@ def test_bad_standard_deviations_of_the_pose_are_named(given: Any, expected: str
     place = replace(RADAR, kind="position")
     with pytest.raises(InputError, match="pose_stds: expected none, as measurements of 'R' do not depend on its pose"):
         read_message(line(pose_stds=given), "line 1", [place], Conventions({}, {}))
+
+
+def test_scans_that_are_written_again_have_their_accuracy(tmp_path: Path) -> None:
+    """Of two sensors with other columns, of rows with empty cells, and of a turn: equal in every bit."""
+    (tmp_path / "radars.yaml").write_text(
+        "recording: {bearings: east}\nregion: {x_min: -3e4, x_max: 3e4, y_min: -3e4, y_max: 3e4}\n"
+        "sensor_defaults: {clutter: {kind: region, rate: 1.0}}\nsensors:\n"
+        "  - {name: R, position: [0, 0], measurement: {kind: bearing_range_altitude}, turn: {period: 8.0},\n"
+        "     noise: {kind: constant, std: [0.01, 40.0, 50.0]}, signal: {mean_db: 16.0, threshold_db: 10.0}}\n"
+        "  - {name: P, position: [0, 0], measurement: {kind: position_altitude},\n"
+        "     noise: {kind: constant, std: [20.0, 20.0, 30.0]}}\n",
+        "utf-8",
+    )
+    rng, rows = np.random.default_rng(3), list[list[Any]]()
+    for k in range(12):
+        bearing = 0.4 - 2.0 * math.pi * (8.0 * k + 1.0) / 8.0
+        std = "" if k == 3 else rng.uniform(20.0, 60.0)
+        altitude = "" if k in (2, 5) else 4000.0 + 10.0 * k
+        plot = [math.remainder(bearing, 2.0 * math.pi), 9000.0 + k, altitude, "", "", std, 1.1, "", "", 11.0 + k]
+        rows.append([8.0 * k + 1.0, "R", *plot, 0.7, 12.5])
+        place = ["", "", 4000.0, 8000.0 + k, 900.0, "", "", *rng.uniform(5.0, 9.0, 2), "", "", ""]
+        rows.append([8.0 * k + 2.0, "P", *place])
+    names = ["bearing_rad", "range_m", "altitude_m", "x", "y", "range_std_m", "bearing_std_deg", "x_std_m", "y_std_m"]
+    header = ["time", "sensor", *names, "snr_db", "own_heading_std_deg", "own_x_std_m"]
+    with (tmp_path / "scans.csv").open("w", newline="") as file:
+        csv.writer(file).writerows([header, *rows])
+    found = scenario_from_recording(tmp_path / "radars.yaml", tmp_path / "scans.csv", speed=100.0)
+    table = scan_table(track_recording(found.scenario, found.recording), found.scenario)
+    radar = [k for k, name in enumerate(table["sensor"]) if name == "R"]
+    assert [table["snr_db"][k] for k in radar] == [11.0 + k for k in range(12)]
+    assert [number for number, k in enumerate(radar) if table["altitude_m"][k] is None] == [2, 5]
+    with (tmp_path / "again.csv").open("w", newline="") as file:
+        csv.writer(file).writerows([list(table), *zip(*table.values(), strict=True)])
+    again = scenario_from_recording(tmp_path / "radars.yaml", tmp_path / "again.csv", speed=100.0).recording
+    for one, other in zip(found.recording.scans, again.scans, strict=True):
+        for scan, same in zip(one, other, strict=True):
+            assert (scan is None) == (same is None)
+            if scan is not None and same is not None:
+                np.testing.assert_array_equal(scan, same)
+    assert again.unused == found.recording.unused

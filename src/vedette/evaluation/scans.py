@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from functools import partial
+from math import isnan
 from typing import Any, TypeAlias
 
 import numpy as np
@@ -10,11 +12,13 @@ import numpy as np
 from vedette.errors import InputError
 from vedette.internal.quantities import COMPONENTS, HEIGHT_DEPENDENT, PLACED, QUANTITIES, is_doppler, si_column
 from vedette.kernels.base.types import BEAM, OWN_HEIGHT, OWN_VELOCITY, Floats
+from vedette.kernels.gaussian.row_noise import MISSING
 from vedette.models.arguments import reject
-from vedette.models.row_noise import measured_part
+from vedette.models.row_noise import measured_part, noise_of_rows
 from vedette.models.turns import is_turn, lags
 from vedette.platforms.compass import course_deg
-from vedette.recorded.conventions import OWN_SPEEDS
+from vedette.recorded import RecordedScans
+from vedette.recorded.conventions import OWN_SPEEDS, UNITS
 from vedette.recorded.extents import places_of
 from vedette.recorded.turns import bearings_of
 from vedette.scenarios import Scenario
@@ -93,7 +97,8 @@ def scan_table(record: RunRecord, scenario: Scenario) -> dict[str, list[Any]]:
 
     Columns are `time` (for a turning radar, the time at which its beam passed), `sensor`, the measured quantities
     (`bearing_deg`, `range_m`, `range_rate_mps`, `x_m`, `y_m`), and the sensor poses (`own_x_m`, `own_y_m`,
-    `own_heading_deg`; with range rates also `own_vx_mps`, `own_vy_mps`).
+    `own_heading_deg`; with range rates also `own_vx_mps`, `own_vy_mps`). Rows of a recording have their columns of
+    accuracy, in SI units, and empty cells for components that were not measured.
     Angles are degrees clockwise from true north if every sensor with a bearing has a compass; else they are
     `bearing_rad` and `own_heading_rad` from the east, for which a reader needs `bearings: east`. Biases in the scenario
     are removed.
@@ -116,9 +121,16 @@ def scan_table(record: RunRecord, scenario: Scenario) -> dict[str, list[Any]]:
     if any(is_doppler(site.kind) for site in sites):
         pose_columns += [f"{name}_mps" for name in OWN_SPEEDS]
     own_heights = ["own_height_m"] if any(site.kind in HEIGHT_DEPENDENT for site in sites) else []
-    table: dict[str, list[Any]] = {name: [] for name in ("time", "sensor", *quantities, *pose_columns, *own_heights)}
-    for time, scans, poses in zip(record.times.tolist(), scans_of_record(record, scenario), record.poses, strict=True):
-        for site, scan, pose in zip(sites, scans, poses, strict=True):
+    recording = None
+    if scenario.model.recording is not None:
+        recording = scenario.model.recording.build(scenario.model, scenario.folder)
+    accuracy = () if recording is None else dict.fromkeys(name for own in recording.accuracy_columns for name in own)
+    header = ["time", "sensor", *quantities, *pose_columns, *own_heights, *map(_accuracy_column, accuracy)]
+    table: dict[str, list[Any]] = {name: [] for name in header}
+    for k, (time, scans, poses) in enumerate(
+        zip(record.times.tolist(), scans_of_record(record, scenario), record.poses, strict=True)
+    ):
+        for s, (site, scan, pose) in enumerate(zip(sites, scans, poses, strict=True)):
             if scan is None:
                 continue
             heading = float(course_deg(site.north, pose[2], pose)) if compass else float(pose[2])
@@ -126,7 +138,8 @@ def scan_table(record: RunRecord, scenario: Scenario) -> dict[str, list[Any]]:
             rows = (site.to_raw(scan.measurements, pose) if compass else scan.measurements).tolist() or [()]
             bearings = bearings_of(scan.measurements, pose, site.kind)
             beam_lags = lags(bearings, pose).tolist() if is_turn(pose) and len(bearings) else [0.0] * len(rows)
-            for row, lag in zip(rows, beam_lags, strict=True):
+            more = [dict[str, Any]() for _ in rows] if recording is None else _accuracy_cells(recording, k, s, columns)
+            for row, lag, own_accuracy in zip(rows, beam_lags, more or [{}], strict=True):
                 place = pose[:2] + lag * pose[OWN_VELOCITY:BEAM] if lag else pose[:2]
                 pose_cells = zip(pose_columns, (*place, heading, *pose[OWN_VELOCITY:]), strict=False)
                 cells = {
@@ -135,10 +148,29 @@ def scan_table(record: RunRecord, scenario: Scenario) -> dict[str, list[Any]]:
                     **dict(pose_cells),
                     "own_height_m": float(pose[OWN_HEIGHT]) if len(pose) > OWN_HEIGHT else 0.0,
                     **dict(zip(columns, row, strict=False)),
+                    **own_accuracy,
                 }
                 for name, column in table.items():
                     column.append(cells.get(name))
     return table
+
+
+def _accuracy_column(name: str) -> str:
+    """Return the name of a column of accuracy in SI units: `range_std_m`, `xy_correlation`, `snr_db`."""
+    return f"{name}_{next(iter(UNITS[name]))}".rstrip("_")
+
+
+def _accuracy_cells(recording: RecordedScans, k: int, s: int, columns: Sequence[str]) -> list[dict[str, Any]]:
+    """Return for each row of a recorded scan its cells of accuracy, and None for components that were not measured."""
+    scan, accuracy, dim = recording.scans[k][s], recording.accuracy[k][s], len(columns)
+    assert scan is not None
+    variances = np.diagonal(noise_of_rows(scan, np.zeros((len(scan), dim, dim))), axis1=1, axis2=2)
+    found = [{columns[i]: None for i in np.flatnonzero(own >= MISSING)} for own in variances]
+    if accuracy is not None:
+        names = [_accuracy_column(name) for name in recording.accuracy_columns[s]]
+        for cells, values in zip(found, accuracy.tolist(), strict=True):
+            cells |= {name: None if isnan(value) else value for name, value in zip(names, values, strict=True)}
+    return found
 
 
 def plane_coordinates(measurements: Floats, kind: str, pose: Floats) -> Floats:

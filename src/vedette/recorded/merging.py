@@ -33,6 +33,7 @@ def merged(
         InputError: a sensor whose standard deviations are unknown.
     """
     scans, texts = [list(own) for own in recording.scans], list[str]()
+    accuracy = [list(own) for own in recording.accuracy]
     for s, (site, own) in enumerate(zip(sites, stds, strict=True)):
         if own is None:
             expected = (
@@ -40,16 +41,20 @@ def merged(
             )
             raise InputError(f"merge: expected {expected}; got custom noise")
         before, after, offsets = 0, 0, [np.empty((0, len(own)))]
-        for instant in scans:
+        for k, instant in enumerate(scans):
             if (scan := instant[s]) is None:
                 continue
-            means, off = _means(scan, site.kind, np.array(own), distance)
+            clusters = _clusters(scan, site.kind, np.array(own), distance)
+            means, off = _means(scan, site.kind, clusters, len(own))
+            if accuracy and (columns := accuracy[k][s]) is not None:
+                accuracy[k][s] = _mean_accuracy(columns, recording.accuracy_columns[s], clusters)
             before, after = before + len(scan), after + len(means)
             offsets.append(off)
             instant[s] = means
         if after < before:
             texts.append(_told(site, before, after, np.concatenate(offsets)))
-    return replace(recording, scans=tuple(map(tuple, scans)), notes=(*recording.notes, *texts))
+    changed = {"scans": tuple(map(tuple, scans)), "accuracy": tuple(map(tuple, accuracy))}
+    return replace(recording, notes=(*recording.notes, *texts), **changed)
 
 
 def _told(site: RecordedSensor, before: int, after: int, offsets: Floats) -> str:
@@ -64,18 +69,27 @@ def _told(site: RecordedSensor, before: int, after: int, offsets: Floats) -> str
     return f"{site.name}: {pluralise(before, 'measurement')} merged into {after}, {spread_of}"
 
 
-def _means(scan: Floats, kind: str, stds: Floats, distance: float) -> tuple[Floats, Floats]:
+def _mean_accuracy(accuracy: Floats, columns: Sequence[str], clusters: Ints) -> Floats:
+    """Return the columns of accuracy of each cluster: root mean squares of standard deviations, means of others."""
+    is_std = np.array([name.endswith("_std") for name in columns])
+    powers = np.where(is_std, accuracy**2, accuracy)
+    means = np.array([powers[clusters == cluster].mean(axis=0) for cluster in range(int(clusters.max(initial=-1)) + 1)])
+    means = means.reshape(-1, len(columns))
+    return np.where(is_std, np.sqrt(np.where(is_std, means, 1.0)), means)
+
+
+def _means(scan: Floats, kind: str, clusters: Ints, meas_dim: int) -> tuple[Floats, Floats]:
     """Return the mean of each cluster of a scan, and offsets from it in clusters of several measurements.
 
     Noise that rows bring is averaged, too: the measurements of an extended target are not independent.
     """
-    clusters, means, offsets = _clusters(scan, kind, stds, distance), list[Floats](), [np.empty((0, len(stds)))]
+    means, offsets = list[Floats](), [np.empty((0, meas_dim))]
     for cluster in range(int(clusters.max(initial=-1)) + 1):
         own = scan[clusters == cluster]
         off = with_wrapped_angles(own - own[0], kind)
         means.append(with_wrapped_angles(own[:1] + off.mean(axis=0), kind)[0])
         if len(own) > 1:
-            offsets.append(measured_part(off - off.mean(axis=0), len(stds)))
+            offsets.append(measured_part(off - off.mean(axis=0), meas_dim))
     return np.array(means).reshape(-1, scan.shape[1]), np.concatenate(offsets)
 
 

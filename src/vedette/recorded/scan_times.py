@@ -111,6 +111,9 @@ class RecordedScans(SummaryRepr):
         unused: columns that were not read.
         notes: warnings: slant ranges; for a sensor whose measurements were merged, their number and spread.
         file: of the rows.
+        accuracy: for each instant one per sensor: (num, num_columns) values of columns of accuracy as they were read,
+            SI units, NaN for an empty cell; None: no scan, or no such columns.
+        accuracy_columns: for each sensor, their quantities, such as "range_std" or "snr".
         gathered: for each sensor, the median time between the first and the last row of its scans of several rows, s; 0
             for a sensor without such scans or whose scans are turns; () if the scans are not from rows.
     """
@@ -126,6 +129,8 @@ class RecordedScans(SummaryRepr):
     notes: tuple[str, ...] = ()
     file: ScansFile = field(default_factory=ScansFile)
     gathered: tuple[float, ...] = ()
+    accuracy: tuple[tuple[Floats | None, ...], ...] = ()
+    accuracy_columns: tuple[tuple[str, ...], ...] = ()
 
     def _summary(self) -> str:
         sizes = f"{pluralise(len(self.times), 'instant')}, {pluralise(self.poses.shape[1], 'sensor')}"
@@ -161,12 +166,16 @@ class RecordedScans(SummaryRepr):
 
 
 class RecordedScan(NamedTuple):
-    """A scan of one sensor: time, sensor, (num, meas_dim) measurements and (3 or more,) pose."""
+    """A scan of one sensor: time, sensor, (num, meas_dim) measurements, (3 or more,) pose.
+
+    accuracy: see `RecordedScans`.
+    """
 
     time: float
     sensor: int
     scan: Floats
     pose: Floats
+    accuracy: Floats | None = None
 
 
 def poses_at_sites(sites: Sequence[RecordedSensor], recorded_scans: Sequence[RecordedScan]) -> Floats:
@@ -201,24 +210,28 @@ def group_by_time(
     for time in reversed(times.tolist()):  # before its first scan, a sensor has the pose of that scan
         for s, scan in instants[time].items():
             at[s, : len(scan.pose)] = scan.pose
-    scans, poses_over_time = [], np.empty((len(times), *poses.shape))
+    scans, accuracy, poses_over_time = [], [], np.empty((len(times), *poses.shape))
     for k, time in enumerate(times.tolist()):
         for s, scan in instants[time].items():
             at[s, : len(scan.pose)] = scan.pose
         poses_over_time[k] = at
-        scans.append(tuple(instants[time][s].scan if s in instants[time] else None for s in range(len(poses))))
-    return RecordedScans(
-        times - times[0], start + float(times[0]), is_utc, tuple(scans), poses_over_time, skipped, bearings
-    )
+        own = [instants[time].get(s) for s in range(len(poses))]
+        scans.append(tuple(None if each is None else each.scan for each in own))
+        accuracy.append(tuple(None if each is None else each.accuracy for each in own))
+    facts = times - times[0], start + float(times[0]), is_utc, tuple(scans), poses_over_time, skipped, bearings
+    return RecordedScans(*facts, accuracy=tuple(accuracy))
 
 
 def remove_biases(recording: RecordedScans, sensors: Sequence[RecordedSensor]) -> RecordedScans:
     """Return the recording as its sensors would have made it without their biases."""
     corrected = []
-    for time, scans, poses in zip(recording.times.tolist(), recording.scans, recording.poses, strict=True):
+    for k, (time, scans, poses) in enumerate(
+        zip(recording.times.tolist(), recording.scans, recording.poses, strict=True)
+    ):
         for s, scan in enumerate(scans):
             if scan is not None:
-                recorded = RecordedScan(time, s, scan, poses[s])
+                accuracy = recording.accuracy[k][s] if recording.accuracy else None
+                recorded = RecordedScan(time, s, scan, poses[s], accuracy)
                 corrected.append(remove_bias(recorded, sensors[s], recording.bearings[s]))
     facts = recording.start, recording.is_utc, recording.skipped, recording.bearings
     return group_by_time(corrected, recording.poses[0], *facts)
@@ -242,4 +255,4 @@ def remove_bias(recorded: RecordedScan, sensor: RecordedSensor, bearings: Bearin
     pose[:2] -= place
     if is_turn(pose) and "bearing" in COMPONENTS[sensor.kind]:
         pose[BEAM] -= measured[0]
-    return RecordedScan(recorded.time - sensor.bias.clock, recorded.sensor, scan, pose)
+    return recorded._replace(time=recorded.time - sensor.bias.clock, scan=scan, pose=pose)

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -55,7 +56,7 @@ from vedette.recorded.tables import (
     number,
     seconds,
 )
-from vedette.recorded.turns import RadarService, bearings_of, scans_of_turns
+from vedette.recorded.turns import bearings_of, scans_of_turns
 from vedette.simulation.records import ScansFile
 
 
@@ -86,7 +87,8 @@ def parse_scans(
     gathered, file = recording.gathered, ScansFile(Path(table.source).name, table.sha256)
     if any(site.bias != NO_BIAS for site in sites):
         recording = remove_biases(recording, sites)
-    return replace(recording, unused=rows.unused, notes=notes, file=file, gathered=gathered)
+    columns = tuple(names or () for names in rows.accuracy)
+    return replace(recording, unused=rows.unused, notes=notes, file=file, gathered=gathered, accuracy_columns=columns)
 
 
 @dataclass(frozen=True, slots=True)
@@ -96,6 +98,7 @@ class _Row:
     sensor: int
     measured: tuple[float, ...] | None
     pose: tuple[float, ...]
+    accuracy: tuple[float, ...]
 
 
 class _Rows(ScanColumns):
@@ -116,7 +119,8 @@ class _Rows(ScanColumns):
     def _row(self, i: int) -> _Row:
         s = self._site(i)
         time, pose = self._seconds(i), self._pose(i, s)
-        return _Row(i, time, s, self._measured(i, s, pose), pose)
+        accuracy = self._own_accuracy(i, s)
+        return _Row(i, time, s, self._measured(i, s, pose, accuracy), pose, tuple(accuracy.values()))
 
     def _site(self, i: int) -> int:
         """Return the sensor of a row; without a column of sensors, the only one."""
@@ -165,7 +169,9 @@ class _Rows(ScanColumns):
         """Return a bearing or heading of a sensor at a place, as an angle of the plane."""
         return float(turned(self._value(i, quantity), self.bearings[s], self.compass, place))
 
-    def _measured(self, i: int, s: int, pose: Sequence[float]) -> tuple[float, ...] | None:
+    def _measured(
+        self, i: int, s: int, pose: Sequence[float], accuracy: Mapping[str, float]
+    ) -> tuple[float, ...] | None:
         """Return the measurement as filters take it; None for a scan without measurements."""
         site = self.sites[s]
         quantities: tuple[str, ...] = COMPONENTS[site.kind]
@@ -182,38 +188,40 @@ class _Rows(ScanColumns):
                 self._angle(i, quantity, s, pose) if quantity == "bearing" else self._third(i, quantity)
                 for quantity in quantities
             ]
-        return (*measured, *self._row_noise(i, s, measured, pose))
+        return (*measured, *self._row_noise(i, s, measured, pose, accuracy))
 
     def _third(self, i: int, quantity: str) -> float:
         """Return a measured value; of a third component that the row does not have, what stands in for it."""
         return GAPS[quantity] if quantity in GAPS and self._is_blank(i, quantity) else self._value(i, quantity)
 
-    def _row_noise(self, i: int, s: int, measured: Sequence[float], pose: Sequence[float]) -> tuple[float, ...]:
+    def _own_accuracy(self, i: int, s: int) -> dict[str, float]:
+        """Return the values of a row's columns of accuracy, NaN for empty cells."""
+        readers = {"xy_correlation": self._correlation, "snr": lambda i: self._value(i, "snr")}
+        return {
+            name: math.nan if self._is_blank(i, name) else readers.get(name, partial(self._std, quantity=name))(i)
+            for name in self.accuracy[s] or ()
+        }
+
+    def _row_noise(
+        self, i: int, s: int, measured: Sequence[float], pose: Sequence[float], accuracy: Mapping[str, float]
+    ) -> tuple[float, ...]:
         """Return covariance and log likelihood ratio of a row in the order of `row_noise`; () for rows without them."""
-        own, signal = self.accuracy[s], self.sites[s].signal
-        if own is None:
+        if self.accuracy[s] is None:
             return ()
-        names, correlation, ratio = COMPONENTS[self.sites[s].kind], 0.0, 0.0
+        own, signal = {name: value for name, value in accuracy.items() if not math.isnan(value)}, self.sites[s].signal
+        names = COMPONENTS[self.sites[s].kind]
         missing = [name in GAPS and self._is_blank(i, name) for name in names]
-        stds = [
-            self._std(i, f"{name}_std") if f"{name}_std" in own and not gap else 0.0
-            for name, gap in zip(names, missing, strict=True)
-        ]
-        if "xy_correlation" in own and not self._is_blank(i, "xy_correlation"):
-            correlation = self._correlation(i)
-        if signal is not None and "snr" in own and not self._is_blank(i, "snr"):
-            ratio = signal.log_likelihood_ratio(self._value(i, "snr"))
-        of_pose = {name: self._std(i, f"own_{name}_std") for name in PoseStds._fields if f"own_{name}_std" in own}
-        added = pose_noise(measured, names, pose, PoseStds(**of_pose)) if of_pose else None
+        stds = [own.get(f"{name}_std", 0.0) if not gap else 0.0 for name, gap in zip(names, missing, strict=True)]
+        ratio = signal.log_likelihood_ratio(own["snr"]) if signal is not None and "snr" in own else 0.0
+        of_pose = PoseStds(**{name: own.get(f"own_{name}_std", 0.0) for name in PoseStds._fields})
+        added = pose_noise(measured, names, pose, of_pose) if any(of_pose) else None
+        correlation = own.get("xy_correlation", 0.0)
         return row_noise(stds, missing, correlation=correlation, log_likelihood_ratio=ratio, added=added)
 
     def _is_blank(self, i: int, quantity: str) -> bool:
         return is_empty(self.table.columns[self._columns[quantity][0]][i])
 
     def _std(self, i: int, quantity: str) -> float:
-        """Return the standard deviation in a cell; 0 for an empty one."""
-        if self._is_blank(i, quantity):
-            return 0.0
         if (value := self._value(i, quantity)) <= 0.0:
             raise self.table.fault(i, self._columns[quantity][0], "a standard deviation above 0, or an empty cell")
         return value
@@ -297,7 +305,7 @@ def _at_instants(rows: list[_Row], how: _Rows, skipped: tuple[str, ...]) -> Reco
     spans = [0.0] * len(sites)
     for s, site in enumerate(sites):
         own = sorted((row for row in rows if row.sensor == s), key=lambda row: row.time)
-        turning = _looks_of_turns(own, s, site, how.service_of(s))
+        turning = _looks_of_turns(own, s, how)
         if turning is not None:
             looks += turning
             continue
@@ -306,23 +314,26 @@ def _at_instants(rows: list[_Row], how: _Rows, skipped: tuple[str, ...]) -> Reco
             spans[s] = float(np.median(several))
         for group in groups:
             time = math.fsum(row.time for row in group) / len(group) if window > 0.0 else group[0].time
-            looks.append(RecordedScan(time, s, _scan(group, site), np.array(group[-1].pose)))
+            pose = np.array(group[-1].pose)
+            looks.append(RecordedScan(time, s, _scan(group, site), pose, _accuracy(group, how.accuracy[s])))
     recording = group_by_time(looks, poses_at_sites(sites, looks), 0.0, how.is_utc, skipped, how.bearings)
     return replace(recording, gathered=tuple(spans))
 
 
-def _looks_of_turns(
-    rows: list[_Row], sensor: int, site: RecordedSensor, service: RadarService | None
-) -> list[RecordedScan] | None:
+def _looks_of_turns(rows: list[_Row], sensor: int, how: _Rows) -> list[RecordedScan] | None:
     """Return the scans of a turning radar; None without a turn."""
-    own = [row for row in rows if row.measured is not None]
+    own, site = [row for row in rows if row.measured is not None], how.sites[sensor]
     if not own:
         return None
     times, poses, scan = np.array([row.time for row in own]), np.array([row.pose for row in own]), _scan(own, site)
-    scans = scans_of_turns(times, bearings_of(scan, poses, site.kind), poses, site.turn, service)
+    scans = scans_of_turns(times, bearings_of(scan, poses, site.kind), poses, site.turn, how.service_of(sensor))
     if scans is None:
         return None
-    return [RecordedScan(each.time, sensor, scan[each.rows], each.pose) for each in scans]
+    accuracy = _accuracy(own, how.accuracy[sensor])
+    return [
+        RecordedScan(each.time, sensor, scan[each.rows], each.pose, None if accuracy is None else accuracy[each.rows])
+        for each in scans
+    ]
 
 
 def _groups(rows: list[_Row], window: float) -> list[list[_Row]]:
@@ -339,3 +350,10 @@ def _scan(rows: list[_Row], site: RecordedSensor) -> Floats:
     measured = [row.measured for row in rows if row.measured is not None]
     length = len(measured[0]) if measured else len(COMPONENTS[site.kind])
     return np.array(measured, np.float64).reshape(len(measured), length)
+
+
+def _accuracy(rows: list[_Row], columns: Sequence[str] | None) -> Floats | None:
+    """Return the columns of accuracy of the rows with a measurement, see `RecordedScans`."""
+    if not columns:
+        return None
+    return np.array([row.accuracy for row in rows if row.measured is not None]).reshape(-1, len(columns))
