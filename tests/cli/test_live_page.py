@@ -155,3 +155,46 @@ def test_the_page_wants_the_token_and_passes_it_on(browser: Browser, folder: Pat
         told(page, "Connected", "link")
     finally:
         loop.kill()
+
+
+def test_heights_are_drawn(browser: Browser, tmp_path: Path) -> None:
+    """Flight levels beside the estimates, and their heights over time; without heights there is no chart."""
+    text_of_file = SYNCHRONOUS.replace("constant_velocity, sigma_v", "constant_velocity_height, sigma_v")
+    text_of_file = text_of_file.replace("kind: position}", "kind: position_altitude}")
+    text_of_file = text_of_file.replace("std: [20.0, 20.0, 5.0, 5.0]", "std: [20.0, 20.0, 5.0, 5.0, 500.0, 3.0]")
+    text_of_file = text_of_file.replace("std: [10.0, 10.0]", "std: [10.0, 10.0, 20.0]")
+    (tmp_path / "small.yaml").write_text(text_of_file, "utf-8")
+    loop, rows = Loop(tmp_path), list[bytes]()
+    for k in range(8):
+        place = [20.0 * k, -10.0 * k, 3000.0 + 5.0 * k]
+        rows += [line(1, float(k), [place, [200.0, 300.0, 900.0]]), line(2, k + 0.5, [])]
+    try:
+        page = browser.open(loop.page, width=1200)
+        told(page, "no scan yet: 0 estimates", "summary")
+        assert page.evaluate("!document.querySelector('[data-part=heights]').hidden")
+        loop.send(rows[:2])
+        told(page, "t = 0.5 s", "summary")
+        ink_at_first = ink(page, "heights")
+        for one in rows[2:]:
+            loop.send([one])
+        told(page, "t = 7.5 s: 2 estimates", "summary")
+        with connect(f"ws://127.0.0.1:{loop.port}/page", proxy=None) as socket:
+            heights = json.loads(socket.recv(WAIT))["frame"]["heights"]
+        assert sorted(round(height, -2) for height, _ in heights) == [900, 3000]
+        assert all(0.0 < std < 30.0 for _, std in heights)
+        assert page.complaints() == []
+        assert ink(page, "heights") > ink_at_first + 20
+    finally:
+        loop.kill()
+
+
+def test_without_heights_no_chart_of_them_is_drawn(browser: Browser, folder: Path) -> None:
+    loop = Loop(folder)
+    try:
+        page = browser.open(loop.page)
+        loop.send(walk(2))
+        told(page, "t = 1 s", "summary")
+        assert page.evaluate("document.querySelector('[data-part=heights]').hidden")
+        assert page.complaints() == []
+    finally:
+        loop.kill()

@@ -22,6 +22,7 @@ from vedette.reports.replay import (
     decimals_for,
     decision_data,
     estimate_data,
+    height_data,
     measurement_data,
     pose_data,
     rounded_list,
@@ -93,6 +94,7 @@ class LiveScreen:
             "known": False,
             "origin": None if model.origin is None else [model.origin.lon, model.origin.lat],
             **({"compass": True} if model.by_compass else {}),
+            **({"heights": {"estimates": [], "truth": []}} if model.has_heights else {}),
             "utc": None,
             "names": [],
             "ospa_unit": "",
@@ -125,6 +127,7 @@ class LiveScreen:
             "estimates": []
             if estimates is None
             else [[*estimate_data(estimates, i, places), 0, 0.0] for i in range(len(estimates.labels))],
+            "heights": height_data(estimates) if estimates is not None and self._scenario.model.has_heights else [],
             "poses": [pose_data(*each, places) for each in zip(poses, self._sections, strict=True)],
             "scans": self._scans(timeline, places),
             "decision": self._decision_data(poses),

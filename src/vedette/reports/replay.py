@@ -186,12 +186,16 @@ def _heights(record: RunRecord) -> dict[str, Any]:
     """
     found: dict[str, Any] = {"estimates": [], "truth": []}
     for scan, estimate in enumerate(record.estimates):
-        stds = np.sqrt(estimate.covs[:, HEIGHT, HEIGHT])
-        pairs = zip(estimate.means[:, HEIGHT], stds, strict=True)
-        found["estimates"].append([rounded_list(pair, 0) for pair in pairs])
+        found["estimates"].append(height_data(estimate))
         _, states = record.truth.at(scan)
         found["truth"].append(rounded_list(states[:, HEIGHT], 0) if states.shape[1] > HEIGHT else [])
     return found
+
+
+def height_data(estimate: Estimate) -> list[list[float]]:
+    """Return the height of each target of an estimate with its standard deviation, m."""
+    stds = np.sqrt(estimate.covs[:, HEIGHT, HEIGHT])
+    return [rounded_list(pair, 0) for pair in zip(estimate.means[:, HEIGHT], stds, strict=True)]
 
 
 def estimate_data(estimate: Estimate, place: int, places: int) -> list[Any]:

@@ -5,7 +5,8 @@ const FORGET = 1000; // labels, beyond which colours begin anew
 
 function startLive(root, run) {
   const part = (name) => document.querySelector(`[data-part="${name}"]`);
-  const series = [run.times, run.truth, run.estimates, run.poses, run.scans];
+  const heights = run.heights ?? { estimates: [], truth: [] };
+  const series = [run.times, run.truth, run.estimates, run.poses, run.scans, heights.estimates, heights.truth];
   const link = { since: null, frameAt: null, skipped: 0 };
   let [player, number] = [null, 0];
 
@@ -33,7 +34,8 @@ function startLive(root, run) {
     if (frame.scene !== run.scene) return location.reload(); // another loop is at this address
     rewind(frame.time);
     Object.assign(run, { utc: frame.utc, extent: frame.extent });
-    [frame.time, [], frame.estimates, frame.poses, frame.scans].forEach((value, place) => series[place].push(value));
+    const values = [frame.time, [], frame.estimates, frame.poses, frame.scans, frame.heights, []];
+    values.forEach((value, place) => series[place].push(value));
     if (frame.decision && frame.decision.number !== number) {
       joined(frame.decision, frame.decision.axes);
       run.decisions.push({ ...frame.decision, scan: run.times.length - 1 });
