@@ -6,7 +6,8 @@
 One radar at rest, on a straight course or weaving, or two radars, measure five ships of up to 10 m/s for five minutes.
 Their ranges are 80 m too long and 60 m too short, and their bearings are turned by 0.5 and -0.8 degrees. The ships move
 with the process noise that the calibration assumes, or straight. Each run is another recording. The biases of the
-second radar on one mast are compared with those of the first. Equal arguments print equal tables.
+second radar on one mast are compared with those of the first. Prints how many biases are reported, and their root mean
+square error. Equal arguments print equal tables.
 """
 
 from __future__ import annotations
@@ -92,7 +93,9 @@ def write_recording(folder: Path, arrangement: Arrangement, rng: np.random.Gener
                 noise, reach = rng.normal(0.0, STDS), math.hypot(dx, dy)
                 rate = (dx * state[2] + dy * state[3]) / reach + noise[2]
                 if rng.random() < 0.9:
-                    found.append((reach + noise[0] + far, math.atan2(dy, dx) + noise[1] + math.radians(turned), rate))
+                    found.append(
+                        (max(reach + noise[0] + far, 0.0), math.atan2(dy, dx) + noise[1] + math.radians(turned), rate)
+                    )
             for dx, dy in rng.uniform(-HALF_SIDE, HALF_SIDE, (rng.poisson(2.0), 2)).tolist():
                 found.append((math.hypot(dx, dy), math.atan2(dy, dx), rng.uniform(-30.0, 30.0)))
             rows += [[time, f"r{s}", *own, a, b, *([c] if doppler else [])] for a, b, c in found]
@@ -116,39 +119,39 @@ def truth_of(sensor: int, name: str, relative: bool) -> float:
     return (biases | models)[name]
 
 
+def row(name: str, runs: int, first: int) -> str:
+    """A row of the table."""
+    arrangement, number = ARRANGEMENTS[name], list(ARRANGEMENTS).index(name)
+    counts, errors = np.zeros((2, 2), np.int64), {key: list[float]() for key in _UNITS}
+    for seed in range(first, first + runs):
+        with tempfile.TemporaryDirectory() as place:
+            write_recording(Path(place), arrangement, np.random.default_rng([seed, number]))
+            scenario = scenario_from_recording(Path(place) / "radars.yaml", Path(place) / "scans.csv", speed=15.0)
+            calibration = calibrate(build_problem(scenario.scenario))
+        for each in calibration.estimates:
+            truth = truth_of(each.parameter.sensor, each.parameter.name, name == "two on one mast")
+            if math.isnan(each.ci_low):
+                continue
+            counts[int(each.parameter.kind != "bias")] += each.ci_low <= truth <= each.ci_high, 1
+            if each.parameter.name in errors:
+                errors[each.parameter.name].append(each.value - truth)
+    num, shares = runs * len(arrangement.courses), " | ".join(f"{a} of {b}" for a, b in counts)
+    return f"| {name} | {' | '.join(_told(errors[key], num, unit) for key, unit in _UNITS.items())} | {shares} |"
+
+
 def table(runs: int, first: int) -> str:
     """The table, of that many recordings a row from that seed on."""
     text = ["| radars | range bias | bearing bias | intervals of biases that cover | of other parameters |"]
-    text += ["| --- | --- | --- | ---: | ---: |"]
-    for number, (name, arrangement) in enumerate(ARRANGEMENTS.items()):
-        counts, reported = np.zeros((2, 2), np.int64), {"range": 0, "bearing_deg": 0}
-        errors: dict[str, list[float]] = {"range": [], "bearing_deg": []}
-        for seed in range(first, first + runs):
-            with tempfile.TemporaryDirectory() as place:
-                write_recording(Path(place), arrangement, np.random.default_rng([seed, number]))
-                scenario = scenario_from_recording(Path(place) / "radars.yaml", Path(place) / "scans.csv", speed=15.0)
-                calibration = calibrate(build_problem(scenario.scenario))
-            for each in calibration.estimates:
-                truth = truth_of(each.parameter.sensor, each.parameter.name, name == "two on one mast")
-                if math.isnan(each.ci_low):
-                    continue
-                counts[int(each.parameter.kind != "bias")] += each.ci_low <= truth <= each.ci_high, 1
-                if each.parameter.name in reported:
-                    reported[each.parameter.name] += 1
-                    errors[each.parameter.name].append(each.value - truth)
-        num, shares = runs * len(arrangement.courses), " | ".join(f"{a} of {b}" for a, b in counts)
-        told = " | ".join(_told(reported[key], num, errors[key], unit) for key, unit in _UNITS.items())
-        text.append(f"| {name} | {told} | {shares} |")
-    text.append(f"\n{runs} recordings of {SECONDS:.0f} s of each.")
-    return "\n".join(text)
+    text += ["| --- | --- | --- | ---: | ---: |", *(row(name, runs, first) for name in ARRANGEMENTS)]
+    return "\n".join([*text, f"\n{runs} recordings of {SECONDS:.0f} s of each."])
 
 
 _UNITS = {"range": "m", "bearing_deg": "deg"}
 
 
-def _told(reported: int, num: int, errors: list[float], unit: str) -> str:
-    error = f", root mean square error {np.sqrt(np.mean(np.square(errors))):.2g} {unit}" if errors else ""
-    return f"{reported} of {num}{error}"
+def _told(errors: list[float], num: int, unit: str) -> str:
+    error = f", error {np.sqrt(np.mean(np.square(errors))):.2g} {unit}" if errors else ""
+    return f"{len(errors)} of {num}{error}"
 
 
 if __name__ == "__main__":

@@ -165,7 +165,7 @@ def _accuracy_cells(recording: RecordedScans, k: int, s: int, columns: Sequence[
     scan, accuracy, dim = recording.scans[k][s], recording.accuracy[k][s], len(columns)
     assert scan is not None
     variances = np.diagonal(noise_of_rows(scan, np.zeros((len(scan), dim, dim))), axis1=1, axis2=2)
-    found = [{columns[i]: None for i in np.flatnonzero(own >= MISSING)} for own in variances]
+    found = [{columns[i]: None for i in np.flatnonzero(own >= MISSING).tolist()} for own in variances]
     if accuracy is not None:
         names = [_accuracy_column(name) for name in recording.accuracy_columns[s]]
         for cells, values in zip(found, accuracy.tolist(), strict=True):

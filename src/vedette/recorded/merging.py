@@ -53,8 +53,8 @@ def merged(
             instant[s] = means
         if after < before:
             texts.append(_told(site, before, after, np.concatenate(offsets)))
-    changed = {"scans": tuple(map(tuple, scans)), "accuracy": tuple(map(tuple, accuracy))}
-    return replace(recording, notes=(*recording.notes, *texts), **changed)
+    notes = (*recording.notes, *texts)
+    return replace(recording, scans=tuple(map(tuple, scans)), accuracy=tuple(map(tuple, accuracy)), notes=notes)
 
 
 def _told(site: RecordedSensor, before: int, after: int, offsets: Floats) -> str:

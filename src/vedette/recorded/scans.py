@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -196,11 +195,14 @@ class _Rows(ScanColumns):
 
     def _own_accuracy(self, i: int, s: int) -> dict[str, float]:
         """Return the values of a row's columns of accuracy, NaN for empty cells."""
-        readers = {"xy_correlation": self._correlation, "snr": lambda i: self._value(i, "snr")}
-        return {
-            name: math.nan if self._is_blank(i, name) else readers.get(name, partial(self._std, quantity=name))(i)
-            for name in self.accuracy[s] or ()
-        }
+        return {name: self._accuracy_value(i, name) for name in self.accuracy[s] or ()}
+
+    def _accuracy_value(self, i: int, name: str) -> float:
+        if self._is_blank(i, name):
+            return math.nan
+        if name == "xy_correlation":
+            return self._correlation(i)
+        return self._value(i, name) if name == "snr" else self._std(i, name)
 
     def _row_noise(
         self, i: int, s: int, measured: Sequence[float], pose: Sequence[float], accuracy: Mapping[str, float]

@@ -82,7 +82,7 @@ class LiveScreen:
         self._names, self._sections = model.sensor_names, model.sensors
         strategy = "" if live.planner is None else live.planner.name
         scene = build_scene(scenario, strategy)
-        run = {
+        run: dict[str, Any] = {
             "live": True,
             "strategy": strategy or "no decisions",
             "group": model.name,

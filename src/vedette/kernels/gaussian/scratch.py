@@ -64,7 +64,7 @@ def wrap(value: float, period: float) -> float:
 @inlined
 def wrap_angle(angle: float) -> float:
     """The same direction in (-pi, pi]."""
-    return wrap(angle, FULL_TURN)  # type: ignore[no-any-return]
+    return wrap(angle, FULL_TURN)
 
 
 @inlined
