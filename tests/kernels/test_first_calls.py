@@ -28,7 +28,7 @@ start, faults, types = threading.Barrier(NUM_THREADS), [], []
 def first_calls(turn):
     try:
         start.wait()
-        types.append(function.numba_type)  # what a kernel asks for
+        types.append(function._numba_type_)  # what a kernel asks for
         assert function.c_address and function.jit_address
         out = np.empty(4)
         function(np.arange(4.0), 1.0, motion.transition_params, out)
@@ -36,7 +36,7 @@ def first_calls(turn):
         assert log_sum(np.zeros(1)) == 0.0
         start.wait()
         copy = pickle.loads(pickled)
-        assert copy.numba_type is not None and copy(np.zeros(4), 1.0, np.array([0.9])) == 0.9
+        assert copy._numba_type_ is not None and copy(np.zeros(4), 1.0, np.array([0.9])) == 0.9
     except BaseException as fault:
         faults.append(repr(fault))
         start.abort()

@@ -266,7 +266,7 @@ def test_experimental_function_type_function_model() -> None:
     from numba.core.datamodel import default_manager
     from numba.experimental.function_type import FunctionModel
 
-    model = default_manager.lookup(survival().model.numba_type)
+    model = default_manager.lookup(survival().model._numba_type_)
     assert isinstance(model, FunctionModel)
     assert sorted(model._fields) == ["c_addr", "jit_addr", "py_addr"]
     assert callable(cgutils.create_struct_proxy)

@@ -165,9 +165,9 @@ def check_kinds(given: Sequence[type], kinds: tuple[type, ...], num_sensors: int
     """Raise `InputError` unless there is one belief per sensor and all are of the expected kinds."""
     if len(given) != num_sensors:
         raise InputError(f"beliefs: expected {num_sensors}, one for each fusion weight; got {len(given)}")
-    expected = join_alternatives([kind.__name__ for kind in kinds])
     for i, kind in enumerate(given):
         if not issubclass(kind, kinds):
+            expected = join_alternatives([each.__name__ for each in kinds])
             raise InputError(f"beliefs[{i}]: expected {expected}; got {kind.__name__}")
 
 

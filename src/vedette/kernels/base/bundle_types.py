@@ -37,7 +37,9 @@ def _key(bundle: tuple[Any, ...]) -> tuple[Any, ...]:
             found.append(id(type_of_bundle(value)))  # Numba would hash all of its fields
         elif isinstance(value, tuple):
             found.append(_key(value))
-        elif hasattr(value, "numba_type"):  # reading the attribute compiles the function if necessary
+        elif hasattr(value, "kind"):  # a model function
+            if not hasattr(value, "jit_address"):
+                value.bind()
             found.append(value.kind)
         else:
             found.append(type(value))

@@ -143,10 +143,10 @@ class ModelFunction:
     function reaches the caller.
     """
 
-    # Addresses of its machine code after `bind`; read by unboxing.
+    # After `bind`: addresses of its machine code, read by unboxing, and its type in kernels, as Numba names it.
     c_address: int
     jit_address: int
-    _numba_type: Any = None
+    _numba_type_: Any
 
     def __init__(self, function: Callable[..., Any], kind: str) -> None:
         self.py_func = function
@@ -156,7 +156,7 @@ class ModelFunction:
 
     def __call__(self, *args: Any) -> Any:
         """Call the function from Python; read-only arrays, such as those of densities, are copied."""
-        if self._numba_type is None:
+        if not hasattr(self, "c_address"):
             self.bind()
         return self.dispatcher(*map(_writeable, args))
 
@@ -165,21 +165,19 @@ class ModelFunction:
         """Numba dispatcher that compiles it and calls it from Python."""
         return _dispatchers().ModelDispatcher.of_model(self, dict(_OPTIONS))
 
-    @property
-    def numba_type(self) -> Any:
-        """Numba type in kernels; reading it compiles the function."""
-        if self._numba_type is None:
-            self.bind()
-        return self._numba_type
-
-    _numba_type_ = numba_type
+    def __getattr__(self, name: str) -> Any:
+        """Compile the function when its type is first read; a property would be called again at every kernel call."""
+        if name != "_numba_type_":
+            raise AttributeError(f"{type(self).__name__!r} object has no attribute {name!r}")
+        self.bind()
+        return self.__dict__[name]
 
     def bind(self) -> None:
         """Compile to the signature of the kind, and store the addresses of the machine code; thread-safe."""
         with _MAKING:
             dispatcher = self.dispatcher
         self.c_address, self.jit_address, found = _dispatchers().addresses_of(dispatcher)
-        self._numba_type = found  # last, as it is read without a lock
+        self._numba_type_ = found  # last, as it is read without a lock
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Pickle a built-in function by its name, and a user's with its code."""
