@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from vedette.calibration import Calibration, ParameterEstimate, calibrate
-from vedette.calibration.registration import MatchedMeasurements, is_one_place
+from vedette.calibration.registration import MatchedMeasurements, groups_with_common_targets, is_one_place
 from vedette.kernels.base.types import Floats
 from vedette.scenarios.calibration import build_problem
 from vedette.scenarios.from_recording import scenario_from_recording
@@ -42,14 +42,20 @@ def weaving(time: float) -> Floats:
 
 
 def calibration_of(
-    folder: Path, courses: Sequence[Course], biases: Sequence[tuple[float, float]], kinds: Sequence[str] = ("bias",)
+    folder: Path,
+    courses: Sequence[Course],
+    biases: Sequence[tuple[float, float]],
+    kinds: Sequence[str] = ("bias",),
+    blind: Sequence[int] = (),
 ) -> Calibration:
-    """Of radars with biases in range, m, and bearing, deg, over 200 s of straight ships."""
+    """Of radars with biases in range, m, and bearing, deg, over 200 s of straight ships, which blind ones miss."""
     rng, rows = np.random.default_rng(5), list[list[object]]()
     for s, (course, (far, turned)) in enumerate(zip(courses, biases, strict=True)):
         for time in np.arange(0.7 + s, 200.0, 4.0 + s).tolist():
             offsets = SHIPS[:, :2] + time * SHIPS[:, 2:] - course(time)
-            for dx, dy in offsets[rng.random(len(SHIPS)) < 0.9].tolist():
+            if s in blind:
+                offsets = rng.uniform(-3000.0, 3000.0, (1, 2))
+            for dx, dy in offsets[rng.random(len(offsets)) < 0.9].tolist():
                 bearing = math.degrees(math.atan2(dy, dx) + rng.normal(0.0, 0.012)) + turned
                 reach = math.hypot(dx, dy) + rng.normal(0.0, 20.0) + far
                 rows.append([time, f"r{s}", reach, bearing, *course(time).tolist()])
@@ -121,3 +127,25 @@ def test_sensors_on_one_straight_course_are_at_one_place(courses: Sequence[Cours
     )
     assert is_one_place(pairs, range(len(courses))) is wanted
     assert is_one_place(pairs, [len(courses)])  # a sensor without measurements of any target
+
+
+def test_groups_share_targets_directly_or_through_others() -> None:
+    """Sensors 0 and 3 through 2; 1 and 4; 5 shares too little, and 6 nothing."""
+    seen = {0: [0], 2: [0, 1], 3: [1], 1: [2], 4: [2, 3], 5: [], 6: [9]}
+    rows = [(s, track) for s, tracks in seen.items() for track in tracks for _ in range(3)] + [(5, 0), (5, 0)]
+    sensors, tracks = np.array(rows).T
+    num, none = len(rows), np.zeros(7, np.int64)
+    pairs = MatchedMeasurements(
+        np.arange(float(num)), sensors, tracks, *(np.zeros((num, size)) for size in (2, 2, 4)), none, none, none
+    )
+    assert groups_with_common_targets(pairs, 7) == [[0, 2, 3], [1, 4], [5], [6]]
+
+
+def test_radars_without_the_first_compare_their_ranges(tmp_path: Path) -> None:
+    """The first is far away from the two others, which see all ships from two places."""
+    far, near, other = at(2e5, 0.0), at(0.0, 0.0), at(0.0, 2500.0)
+    found = by_name(calibration_of(tmp_path, [far, near, other], [(0.0, 0.0), (80.0, 0.0), (-60.0, 0.0)], blind=(0,)))
+    assert found[0, "range"].reason
+    for s, truth in ((1, 80.0), (2, -60.0)):
+        assert abs(found[s, "range"].value - truth) < 3.0 * found[s, "range"].std
+        assert found[s, "range"].std < 20.0

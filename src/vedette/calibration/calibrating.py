@@ -15,10 +15,10 @@ from vedette.calibration.parameters import Parameter, Problem
 from vedette.calibration.registration import (
     BIASES,
     MatchedMeasurements,
+    groups_with_common_targets,
     is_one_place,
     match_measurements,
     register,
-    sensors_with_common_targets,
 )
 from vedette.internal.quantities import COMPONENTS, QUANTITIES
 from vedette.kernels.base.types import Floats
@@ -94,9 +94,9 @@ def calibrate(
 
     before = float(terms(said[asked], asked).sum())
     guessed, pairs = _guess(problem, said, asked, progress)
-    together = sensors_with_common_targets(pairs, len(problem.sites))
-    apart = np.flatnonzero(~together | (together.sum() == 1)).tolist()  # without linked sensors the first is apart, too
-    held = {i: _unknown(problem, i) for i in asked if i in _biases_by_motion(problem, pairs, apart)}
+    groups = groups_with_common_targets(pairs, len(problem.sites))
+    apart = [s for group in groups if group != groups[0] or len(group) == 1 for s in group]
+    held = {i: _unknown(problem, i) for i in asked if i in _biases_by_motion(problem, pairs, groups)}
     free = [i for i in asked if i not in held]
     if not free:
         return Calibration(tuple(held[i] for i in asked), before, before, True, 0)
@@ -129,15 +129,15 @@ def calibrate(
     return Calibration(kept, log_likelihood, before, maximum.converged, directions[0])
 
 
-def _biases_by_motion(problem: Problem, pairs: MatchedMeasurements, apart: Sequence[int]) -> list[int]:
+def _biases_by_motion(problem: Problem, pairs: MatchedMeasurements, groups: Sequence[Sequence[int]]) -> list[int]:
     """Return the biases of bearings and ranges that would follow from the assumed motion of the targets alone.
 
     They are those of a sensor that shares no targets with a sensor at another place. Of several sensors at one place
     they are those of the first, which the others are compared with. A sensor that measures positions suffices anywhere.
+
+    groups: of sensors that share targets.
     """
-    kinds = [COMPONENTS[site.kind] for site in problem.sites]
-    groups = [*([s] for s in apart), [s for s in range(len(kinds)) if s not in apart]]
-    found = list[int]()
+    kinds, found = [COMPONENTS[site.kind] for site in problem.sites], list[int]()
     for group in groups:
         if any("x" in kinds[s] for s in group) or not is_one_place(pairs, group):
             continue

@@ -125,15 +125,19 @@ def _slopes(offsets: Floats, kind: str) -> Floats:
     return np.stack([np.stack(values[component], axis=1) for component in COMPONENTS[kind][:2]], axis=1)
 
 
-def sensors_with_common_targets(pairs: MatchedMeasurements, num_sensors: int) -> Bools:
-    """(num_sensors,) whether a sensor shares targets with the first, directly or through other sensors."""
+def groups_with_common_targets(pairs: MatchedMeasurements, num_sensors: int) -> list[list[int]]:
+    """Return the sensors in groups that share targets, directly or through others, in order of their first sensors."""
     counts = np.zeros((num_sensors, pairs.tracks.max(initial=-1) + 1), np.int64)
     np.add.at(counts, (pairs.sensors, pairs.tracks), 1)
     seen: Bools = counts >= _LEAST_SEEN
-    reached: Bools = np.arange(num_sensors) == 0
-    for _ in range(num_sensors):
-        reached = np.logical_or(reached, seen[:, seen[reached].any(axis=0)].any(axis=1))
-    return reached
+    groups, left = list[list[int]](), list(range(num_sensors))
+    while left:
+        reached: Bools = np.arange(num_sensors) == left[0]
+        for _ in range(num_sensors):
+            reached = np.logical_or(reached, seen[:, seen[reached].any(axis=0)].any(axis=1))
+        groups.append(np.flatnonzero(reached).tolist())
+        left = [s for s in left if not reached[s]]
+    return groups
 
 
 def is_one_place(pairs: MatchedMeasurements, sensors: Sequence[int]) -> bool:
