@@ -328,6 +328,53 @@ def negative_noise(state, dt, params, out):
     out[0, 1] = out[1, 0] = 1.0 + 1e-6
 
 
+def in_order(x: int, y: int, vx: int, vy: int) -> models.MotionModel:
+    """Constant velocity with the components of the state in another order."""
+
+    @models.model_function("transition")
+    def moves(state, dt, params, out):
+        for i in range(len(state)):
+            out[i] = state[i]
+        out[x] += dt * state[vx]
+        out[y] += dt * state[vy]
+
+    @models.model_function("process_noise_cov")
+    def shaken(state, dt, params, out):
+        for i in range(len(state)):
+            for j in range(len(state)):
+                out[i, j] = dt if i == j else 0.0
+
+    return models.MotionModel(6, moves, shaken)
+
+
+@pytest.mark.parametrize(
+    ("order", "fault"),
+    [
+        ((0, 1, 2, 3), None),
+        ((0, 1, 3, 4), "component 2, of which 1 more moves a target by 0 m/s along x and 0 m/s along y"),
+        ((0, 2, 1, 3), "component 2, of which 1 more moves a target by 0 m/s along x and 0 m/s along y"),
+        ((0, 1, 3, 2), "component 2, of which 1 more moves a target by 0 m/s along x and 1 m/s along y"),
+    ],
+    ids=["x y vx vy", "x y z vx vy vz", "x vx y vy", "x y vy vx"],
+)
+def test_a_state_whose_velocity_is_elsewhere_is_refused(order, fault):
+    motion = in_order(*order)
+    assert motion.velocity_fault() == fault
+    if fault is None:
+        motion.check(np.ones((2, 6)))
+    else:
+        with pytest.raises(
+            ModelError, match=r"motion: expected a state that begins with x, y, vx, vy, .*; got component 2"
+        ):
+            motion.check(np.ones((2, 6)))
+
+
+def test_short_states_and_states_in_a_turn_have_no_velocity_fault():
+    turning = models.coordinated_turn(1.0, 0.1)
+    assert turning.velocity_fault() is None
+    assert models.MotionModel(2, MOTION.transition, MOTION.process_noise_cov).velocity_fault() is None
+
+
 @made("prob_survival")
 def minus(state, dt, params):
     return -0.1

@@ -57,6 +57,25 @@ def motion(speed: float = 1.0) -> MotionModel:
     return MotionModel(3, _drift, _drift_noise, np.array([speed]), np.empty(0))
 
 
+@model_function("transition")
+def _with_height_third(state: Floats, dt: float, params: Floats, out: Floats) -> None:
+    for i in range(3):
+        out[i] = state[i] + dt * state[i + 3]
+        out[i + 3] = state[i + 3]
+
+
+@model_function("process_noise_cov")
+def _noise_of_six(state: Floats, dt: float, params: Floats, out: Floats) -> None:
+    for i in range(6):
+        for j in range(6):
+            out[i, j] = dt if i == j else 0.0
+
+
+def height_third() -> MotionModel:
+    """Constant velocity; state [px, py, pz, vx, vy, vz]."""
+    return MotionModel(6, _with_height_third, _noise_of_six)
+
+
 def bad_motion() -> MotionModel:
     """Fails."""
     raise ValueError("no such current")

@@ -193,6 +193,18 @@ def test_a_state_dimension_that_is_not_the_models() -> None:
         filters_of(scenario(("{kind: constant_velocity, sigma_v: 1.0}", text)))
 
 
+def test_a_state_in_another_order_is_refused() -> None:
+    text = "{kind: custom, function: 'own_models.py:height_third', state_dim: 6}"
+    loaded = scenario(
+        ("{kind: constant_velocity, sigma_v: 1.0}", text),
+        ("mean: [0.0, 0.0, 0.0, 0.0], std: [5.0, 5.0, 2.0, 2.0]", "mean: [0, 0, 0, 0, 0, 0], std: [1, 1, 1, 1, 1, 1]"),
+        ("state: [1.0, 2.0, 0.5, -0.5]", "state: [1, 2, 3, 4, 5, 6]"),
+    )
+    message = r"motion\.function: expected a state that begins with x, y, vx, vy, .*; got component 2, of which 1 more"
+    with pytest.raises(InputError, match=message):
+        filters_of(loaded)
+
+
 def test_filters_of_each_kind() -> None:
     ranked, _ = filters_of(scenario())
     assert isinstance(ranked, DeltaGlmbFilter)

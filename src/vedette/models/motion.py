@@ -8,6 +8,7 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import ArrayLike
 
+from vedette.errors import ModelError
 from vedette.kernels.base.types import Floats, Motion
 from vedette.kernels.gaussian.sigma_points import CUBATURE, LINEARISED, SWITCHED, UNSCENTED
 from vedette.models.arguments import dimension, one_of, params_vector, positive, probability, real, reject, state_table
@@ -15,6 +16,7 @@ from vedette.models.fields import Positive, Probability, part
 from vedette.models.functions import ModelFunction, model_function, numbers_at, require_kind, write_rows
 from vedette.models.probe import probe_array, probe_covariance, probe_jacobian, probe_probability
 
+_BRIEF = 1e-3  # s, in which the direction of a velocity hardly changes
 METHODS = {"ekf": LINEARISED, "ukf": UNSCENTED, "ckf": CUBATURE}
 
 
@@ -33,6 +35,9 @@ def resolve_method(name: str, method: str, has_jacobian: bool, *, bends: bool = 
     return METHODS[method]
 
 
+STATE_ORDER = "that begins with x, y, vx, vy, other components behind them"
+
+
 @model_function("transition_jacobian")
 def _no_transition_jacobian(state: Floats, dt: float, params: Floats, out: Floats) -> None:
     """Placeholder for a missing Jacobian in a kernel bundle whose method never calls it."""
@@ -44,7 +49,7 @@ class MotionModel:
     """Markov motion of one target over any time step (paper: the transition density f(x_k | x_k-1)).
 
     Attributes:
-        state_dim: length of the state; state[0:2] is the position in metres.
+        state_dim: length of the state; state[0:2] is the position in metres, state[2:4] if it exists the velocity.
         transition: model function of kind `transition`.
         process_noise_cov: model function of kind `process_noise_cov`.
         transition_params, noise_params: parameter vectors of the two functions; anything array-like is converted.
@@ -99,8 +104,29 @@ class MotionModel:
         write_rows(self.process_noise_cov, table, dt, self.noise_params, out)
         return out
 
+    def velocity_fault(self) -> str | None:
+        """Return in words why components 2 and 3 are not the velocity along x and y; None if they are, or do not exist.
+
+        Births, regions and outputs take them for it: in a state [x, vx, y, vy] they would read y as a velocity. Raises
+        `ModelError` if the transition function does.
+        """
+        if self.state_dim < 4:
+            return None  # without velocities
+        states = np.zeros((3, self.state_dim))
+        states[:, :4] = 100.0, 200.0, 30.0, 40.0
+        states[1, 2] += 1.0
+        states[2, 3] += 1.0
+        places = self.propagate(states, _BRIEF)[:, :2]
+        for axis, moved in enumerate(places[1:] - places[0]):
+            if moved[axis] <= 10.0 * abs(moved[1 - axis]):  # not if one is NaN, which is another fault
+                x, y = moved / _BRIEF
+                return (
+                    f"component {axis + 2}, of which 1 more moves a target by {x:g} m/s along x and {y:g} m/s along y"
+                )
+        return None
+
     def check(self, states: ArrayLike, dt: float = 1.0) -> None:
-        """Check every function at each state.
+        """Check every function at each state, and the order of the components.
 
         Raises:
             ModelError: an invalid result; the message has the function, the state, the expected and the given value.
@@ -113,6 +139,9 @@ class MotionModel:
             probe_covariance(self.process_noise_cov, (state, dt, self.noise_params), self.state_dim, definite=False)
             if self.transition_jacobian is not None:
                 probe_jacobian(self.transition_jacobian, self.transition, args, shape, False)
+        fault = self.velocity_fault()
+        if fault is not None:
+            raise ModelError(f"motion: expected a state {STATE_ORDER}; got {fault}")
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -97,10 +97,18 @@ class CustomMotion(Custom):
         return "grouped"
 
     def build(self, folder: Path, method: GaussianMethod = "auto") -> MotionModel:
-        """Return the motion model. Raises `InputError` if its state dimension differs from the given one."""
+        """Return the motion model.
+
+        Raises `InputError` if its state dimension differs from the given one, or its state has another order.
+        """
+        from vedette.models.motion import STATE_ORDER
+
         motion: MotionModel = self.instantiate(folder)
         if motion.state_dim != self.state_dim:
             raise MissingMember(self, "state_dim", f"that of {self.function}, {motion.state_dim}", str(self.state_dim))
+        fault = motion.velocity_fault()
+        if fault is not None:
+            raise MissingMember(self, "function", f"a state {STATE_ORDER}", fault)
         return motion if method == "auto" else replace(motion, method=method)
 
 
