@@ -14,7 +14,7 @@ from typer.testing import CliRunner, Result
 
 from recordings import write_recording
 from vedette.cli import app
-from vedette.cli.results import saved_run
+from vedette.cli.reporting import saved_run
 from vedette.evaluation.figures import write_video
 from vedette.evaluation.figures.video import _Drawing
 

@@ -17,13 +17,13 @@ from vedette.cli.errors import CommandGroup
 from vedette.cli.live import live
 from vedette.cli.merging import merge
 from vedette.cli.output import with_output_options
+from vedette.cli.reporting import report, video
 from vedette.cli.reproducing import reproduce
-from vedette.cli.results import report, results, upgrade
+from vedette.cli.results import results, upgrade
 from vedette.cli.running import run
 from vedette.cli.scenario_files import crowd, generate, init, list_, schema
 from vedette.cli.show import show
 from vedette.cli.tracking import track
-from vedette.cli.video import video
 
 app = typer.Typer(
     cls=CommandGroup,

@@ -6,39 +6,48 @@ import math
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from vedette.cli.calibration_table import calibration_document, print_windows
+from vedette.cli.calibration_table import calibration_document, print_windows, windows_document
 from vedette.cli.compiling import compiling
 from vedette.cli.errors import check_ending
-from vedette.cli.options import BadRows, Overwrite, SensorsFile, Speed, Trust
+from vedette.cli.options import BadRows, Overwrite, ScansFile, SensorsFile, Speed, Trust
 from vedette.cli.output import console, echo, emit_json
 from vedette.cli.running import interruptible
+from vedette.cli.scenario_files import write_text
 from vedette.cli.tracking import read_recording
 from vedette.errors import InputError
 
+if TYPE_CHECKING:
+    from vedette.calibration import CalibrationWindow
+    from vedette.scenarios import Scenario
+
 NOT_CONVERGED = 3  # exit status
+
+Out = Annotated[
+    Path | None,
+    typer.Option("--out", metavar="FILE", help="Write the sensors file with the estimates; default: print only."),
+]
+SensorPositions = Annotated[
+    bool, typer.Option("--sensor-positions", help="Also estimate errors of the sensor positions (x, y).")
+]
+Window = Annotated[
+    float | None,
+    typer.Option(
+        "--window", metavar="SECONDS", min=0.001, help="Calibrate each part of this length; for drifting biases."
+    ),
+]
 
 
 def calibrate(
-    scans: Annotated[Path, typer.Argument(metavar="SCANS", help="CSV or Parquet file with one row per measurement.")],
+    scans: ScansFile,
     sensors: SensorsFile,
-    out: Annotated[
-        Path | None,
-        typer.Option("--out", metavar="FILE", help="Write the sensors file with the estimates; default: print only."),
-    ] = None,
+    out: Out = None,
     overwrite: Overwrite = False,
-    position: Annotated[
-        bool, typer.Option("--sensor-positions", help="Also estimate errors of the sensor positions (x, y).")
-    ] = False,
-    window: Annotated[
-        float | None,
-        typer.Option(
-            "--window", metavar="SECONDS", min=0.001, help="Calibrate each part of this length; for drifting biases."
-        ),
-    ] = None,
+    position: SensorPositions = False,
+    window: Window = None,
     speed: Speed = 10.0,
     bad_rows: BadRows = "refuse",
     trust: Trust = False,
@@ -47,45 +56,46 @@ def calibrate(
 
     From recorded scans alone, by maximum likelihood, with 95 % intervals.
     """
-    from vedette.calibration.bias_drift import calibrate_windows
-    from vedette.internal.files import unwritable, write_file
-    from vedette.scenarios.calibration import build_problem, calibrated_text
+    from vedette.scenarios.calibration import calibrated_text
+
+    _check_output(out, overwrite)
+    recorded, warnings = read_recording(sensors, scans, None, speed=speed, bad_rows=bad_rows, trust=trust)
+    with interruptible("nothing was written"):
+        windows = _calibrate(recorded.scenario, window or math.inf, position)
+        if out is not None:
+            write_text(out, calibrated_text(recorded.scenario, sensors, windows[-1].calibration, out.parent))
+    names = recorded.scenario.model.sensor_names
+    print_windows(windows, names, position=position)
+    if out is None:
+        echo("Nothing was written. Add --out calibrated.yaml to save the estimates for `vedette track`.")
+    else:
+        echo(f"Wrote {out}. Use it with: vedette track {scans} --sensors {out}")
+    document = (
+        calibration_document(windows[0].calibration, names) if window is None else windows_document(windows, names)
+    )
+    origin = {"assumptions": recorded.assumed, "skipped": recorded.recording.skipped, "warnings": warnings}
+    emit_json({**document, **origin, "written": [] if out is None else [out]})
+    if not all(part.calibration.converged for part in windows):
+        raise typer.Exit(NOT_CONVERGED)
+
+
+def _check_output(out: Path | None, overwrite: bool) -> None:
+    from vedette.internal.files import unwritable
 
     check_ending(out, "--out", "yaml", "yml")
     if out is not None and out.exists() and not overwrite:
         raise InputError(f"{out}: already there; --overwrite replaces it")
     if out is not None and (reason := unwritable(out)):
         raise InputError(f"{out}: expected a file that can be written; {reason}")
-    recorded, warnings = read_recording(sensors, scans, None, speed=speed, bad_rows=bad_rows, trust=trust)
-    scenario, recording, assumed = recorded
-    with interruptible("nothing was written"):
-        problem = build_problem(scenario, position=position)
-        with compiling(), _pass_counter() as progress:
-            windows = list(calibrate_windows(problem, window or math.inf, progress))
-        if out is not None:
-            text = calibrated_text(scenario, sensors, windows[-1].calibration, out.parent)
-            write_file(out, lambda file: file.write(text.encode("utf-8")), make_folder=True)
-    names = scenario.model.sensor_names
-    print_windows(windows, names, position=position)
-    if out is None:
-        echo("Nothing was written. Add --out calibrated.yaml to save the estimates for `vedette track`.")
-    else:
-        echo(f"Wrote {out}. Use it with: vedette track {scans} --sensors {out}")
-    converged = all(part.calibration.converged for part in windows)
-    documents = [calibration_document(part.calibration, names) for part in windows]
-    origin = {
-        "assumptions": assumed,
-        "skipped": recording.skipped,
-        "warnings": warnings,
-        "written": [] if out is None else [out],
-    }
-    if window is None:
-        emit_json({**documents[0], **origin})
-    else:
-        spans = [{"begin_s": part.begin, "end_s": part.end} for part in windows]
-        emit_json({"windows": [span | document for span, document in zip(spans, documents, strict=True)], **origin})
-    if not converged:
-        raise typer.Exit(NOT_CONVERGED)
+
+
+def _calibrate(scenario: Scenario, window: float, position: bool) -> list[CalibrationWindow]:
+    from vedette.calibration.bias_drift import calibrate_windows
+    from vedette.scenarios.calibration import build_problem
+
+    problem = build_problem(scenario, position=position)
+    with compiling(), _pass_counter() as progress:
+        return list(calibrate_windows(problem, window, progress))
 
 
 @contextmanager

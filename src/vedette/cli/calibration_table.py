@@ -39,6 +39,16 @@ def calibration_document(calibration: Calibration, names: tuple[str, ...]) -> di
     }
 
 
+def windows_document(windows: list[CalibrationWindow], names: tuple[str, ...]) -> dict[str, Any]:
+    """Return the calibrations of several windows as data. names: names of the sensors."""
+    return {
+        "windows": [
+            {"begin_s": window.begin, "end_s": window.end, **calibration_document(window.calibration, names)}
+            for window in windows
+        ]
+    }
+
+
 def print_windows(windows: list[CalibrationWindow], names: tuple[str, ...], *, position: bool) -> None:
     """Print the estimates of each window, their reference sensor, warnings and likelihoods."""
     _print_table(windows, names)

@@ -11,14 +11,13 @@ from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 
 import typer
 
-from vedette.cli.assumptions import note_assumptions
 from vedette.cli.compiling import compiling
 from vedette.cli.completing import strategies
 from vedette.cli.errors import usage_error
 from vedette.cli.options import Seed, Speed, Trust
 from vedette.cli.output import echo, emit_json, note
 from vedette.cli.running import CodeTrust, check_planner, compile_if_cold, interruptible
-from vedette.cli.scenario_files import print_warnings
+from vedette.cli.scenario_files import note_assumptions, print_warnings
 from vedette.internal.extras import require_packages
 
 if TYPE_CHECKING:

@@ -18,22 +18,21 @@ if TYPE_CHECKING:
 
 _MAX_SHOWN_COMMANDS = 3
 
+Folders = Annotated[
+    list[Path], typer.Argument(metavar="DIR", help="Results folders of shards, or folders that contain them.")
+]
+Out = Annotated[
+    Path | None, typer.Option("--out", metavar="DIR", help="Results folder; default: named after the campaign.")
+]
+WriteTables = Annotated[
+    bool, typer.Option("--tables/--no-tables", help="Write tables for other tools if no run is missing.")
+]
 
-def merge(
-    folders: Annotated[
-        list[Path], typer.Argument(metavar="DIR", help="Results folders of shards, or folders that contain them.")
-    ],
-    out: Annotated[
-        Path | None, typer.Option("--out", metavar="DIR", help="Results folder; default: named after the campaign.")
-    ] = None,
-    tables: Annotated[
-        bool, typer.Option("--tables/--no-tables", help="Write tables for other tools if no run is missing.")
-    ] = True,
-) -> None:
+
+def merge(folders: Folders, out: Out = None, tables: WriteTables = True) -> None:
     """Merge the results folders of shards into one, and name missing shards."""
     require_packages("vedette merge", "pyarrow")
     from vedette.campaigns import merging
-    from vedette.campaigns.shards import ranges
 
     with interruptible("nothing of this call was kept; the shards are as they were"):
         merged = merging.merge(folders, out, tables=tables)
@@ -52,18 +51,22 @@ def merge(
             "commands": commands,
         }
     )
-    if not commands:
-        place = shlex.quote(str(results.folder))
-        echo(f"next: vedette results {place}; vedette report {place}")
-        return
+    if commands:
+        _print_missing(merged, commands)
+        raise typer.Exit(1)
+    place = shlex.quote(str(results.folder))
+    echo(f"next: vedette results {place}; vedette report {place}")
+
+
+def _print_missing(merged: MergeResult, commands: list[str]) -> None:
+    from vedette.campaigns.shards import ranges
+
     echo_error(f"missing: {pluralise(merged.num_missing, 'run')}, which these run (SPEC: the campaign's file):")
     for command in commands[:_MAX_SHOWN_COMMANDS]:
         echo_error(f"  {command}")
     if len(commands) > _MAX_SHOWN_COMMANDS:
-        echo_error(
-            f"  and so on, {len(commands)} shards; as a job array: sbatch --array={ranges(merged.missing)} SCRIPT"
-        )
-    raise typer.Exit(1)
+        job_array = f"sbatch --array={ranges(merged.missing)} SCRIPT"
+        echo_error(f"  and so on, {len(commands)} shards; as a job array: {job_array}")
 
 
 def _commands(merged: MergeResult) -> list[str]:

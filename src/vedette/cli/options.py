@@ -31,6 +31,7 @@ Trust = Annotated[
     bool, typer.Option("--allow-code", help="Run Python code named in a scenario that other users can modify.")
 ]
 BAD_ROWS = ("refuse", "skip")
+ScansFile = Annotated[Path, typer.Argument(metavar="SCANS", help="CSV or Parquet file with one row per measurement.")]
 SensorsFile = Annotated[
     Path,
     typer.Option("--sensors", metavar="FILE", help="Sensors file (YAML): where the sensors are and what they measure."),

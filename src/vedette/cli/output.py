@@ -16,7 +16,8 @@ import shutil
 import sys
 import textwrap
 import warnings
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from contextvars import ContextVar
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, NamedTuple, TextIO, get_type_hints
@@ -139,6 +140,17 @@ def console(*, stderr: bool = False) -> Console:
     mode = _output_mode.get()
     silent = mode.quiet or (mode.as_json and not stderr)
     return Console(stderr=stderr, quiet=silent, highlight=False, markup=False, emoji=False)
+
+
+@contextmanager
+def bar(what: str, total: int | None = None) -> Iterator[Callable[..., None]]:
+    """Show a progress bar on a terminal; yields a function that receives the amount done, and the total if unknown."""
+    from rich.progress import Progress
+
+    screen = console(stderr=True)
+    with Progress(console=screen, disable=not screen.is_terminal, transient=True) as progress:
+        task = progress.add_task(what, total=total)
+        yield lambda done, new_total=total: progress.update(task, completed=done, total=new_total)
 
 
 def print_names(rows: Mapping[str, str]) -> None:

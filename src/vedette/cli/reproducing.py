@@ -6,7 +6,7 @@ import os
 from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -32,35 +32,41 @@ _RUNS = 30
 _STRATEGIES = ("jdm", "idm", "assigned_target", "random")
 _FOLDER = "reproduction"
 
+ComparisonName = Annotated[
+    str,
+    typer.Argument(
+        help="A published comparison of --list, a built-in scenario, or a scenario file.",
+        autocompletion=reproducible,
+    ),
+]
+PlannerNames = Annotated[
+    str | None,
+    typer.Option(
+        "--planners",
+        metavar="LIST",
+        help="Strategies to compare, the first is the reference; else those of the published "
+        "comparison, or jdm,idm,assigned_target,random.",
+        autocompletion=lists_of_strategies,
+    ),
+]
+Runs = Annotated[
+    int | None, typer.Option("--runs", min=1, help="Paired runs of each strategy; else as published, or 30.")
+]
+Out = Annotated[
+    Path | None,
+    typer.Option("--out", metavar="DIR", help="Folder for all of it; else reproduction, or the comparison's name."),
+]
+ListComparisons = Annotated[bool, typer.Option("--list", help="List the published comparisons, and stop.")]
+
 
 def reproduce(
-    name: Annotated[
-        str,
-        typer.Argument(
-            help="A published comparison of --list, a built-in scenario, or a scenario file.",
-            autocompletion=reproducible,
-        ),
-    ] = "paper-a",
-    planners: Annotated[
-        str | None,
-        typer.Option(
-            "--planners",
-            metavar="LIST",
-            help="Strategies to compare, the first is the reference; else those of the published "
-            "comparison, or jdm,idm,assigned_target,random.",
-            autocompletion=lists_of_strategies,
-        ),
-    ] = None,
-    runs: Annotated[
-        int | None, typer.Option("--runs", min=1, help="Paired runs of each strategy; else as published, or 30.")
-    ] = None,
+    name: ComparisonName = "paper-a",
+    planners: PlannerNames = None,
+    runs: Runs = None,
     seed: Seed = 0,
     workers: Workers = 0,
-    out: Annotated[
-        Path | None,
-        typer.Option("--out", metavar="DIR", help="Folder for all of it; else reproduction, or the comparison's name."),
-    ] = None,
-    list_: Annotated[bool, typer.Option("--list", help="List the published comparisons, and stop.")] = False,
+    out: Out = None,
+    list_: ListComparisons = False,
     trust: Trust = False,
 ) -> None:
     """Compare strategies over paired runs, as the paper does, or on a published scene beside what is published of it.
@@ -68,16 +74,14 @@ def reproduce(
     A campaign with its report, tables and figures.
     """
     require_packages("vedette reproduce", "jinja2", "matplotlib", "pyarrow")
-    if not list_:
-        load_workers(workers)
+    if list_:
+        _print_list()
+        return
+    load_workers(workers)
     from vedette.campaigns import open_results, resolve
     from vedette.campaigns.published import published_comparisons
 
-    comparisons = published_comparisons()
-    if list_:
-        _print_list(comparisons)
-        return
-    published = comparisons.get(name)
+    published = published_comparisons().get(name)
     spec = (
         comparison_spec(name, planners, runs, seed)
         if published is None
@@ -88,24 +92,9 @@ def reproduce(
     outcome = run_with_progress(campaign, folder, workers)
     opened = open_results(folder)
     groups = opened.comparisons()
-    compared_with = published if published is not None and not published.claims else None
-    if compared_with is None:
-        print_results(opened, groups)
-    else:
-        _print_with_published(opened, groups, compared_with)
-    claims = () if published is None else _check_claims(published, groups)
-    if published is not None:
-        _print_claims(claims)
-        _print_provenance(published)
-    if compared_with is not None:
-        print_progress(opened)
-    page = _write(opened, compared_with, folder)
-    document = {
-        "published": [asdict(score) for score in (() if published is None else published.published)],
-        "claims": [claim._asdict() for claim in claims],
-        "report": page,
-    }
-    emit_json({**results_document(opened, groups), **document})
+    document = _print_outcome(opened, groups, published)
+    page = _write(opened, published, folder)
+    emit_json({**results_document(opened, groups), **document, "report": page})
     report_failures(outcome.failed)
 
 
@@ -141,15 +130,39 @@ def _names(planners: str | None) -> tuple[str, ...] | None:
     return None if planners is None else tuple(name.strip() for name in planners.split(","))
 
 
-def _print_list(comparisons: dict[str, PublishedComparison]) -> None:
-    titles = {name: published.title for name, published in comparisons.items()}
+def _print_list() -> None:
+    from vedette.campaigns.published import published_comparisons
+
+    titles = {name: published.title for name, published in published_comparisons().items()}
     print_names(titles)
     emit_json([{"name": name, "title": title} for name, title in titles.items()])
 
 
-def _print_with_published(
-    opened: CampaignResults, groups: Sequence[GroupComparison], published: PublishedComparison
-) -> None:
+def _print_outcome(
+    opened: CampaignResults, groups: Sequence[GroupComparison], published: PublishedComparison | None
+) -> dict[str, Any]:
+    """Print the results, and what is published of them; return the published part of the document."""
+    if published is None:
+        print_results(opened, groups)
+        return {"published": [], "claims": []}
+    from vedette.campaigns.published import checked_claims, provenance
+
+    claims = [claim for group in groups for claim in checked_claims(published, group.comparison)]
+    if published.claims:
+        print_results(opened, groups)
+    else:
+        _print_scores(opened, groups, published)
+    _print_claims(claims)
+    for line in provenance(published):
+        console().print(line, style="dim")
+    if not published.claims:
+        print_progress(opened)
+    scores = [asdict(score) for score in published.published]
+    return {"published": scores, "claims": [claim._asdict() for claim in claims]}
+
+
+def _print_scores(opened: CampaignResults, groups: Sequence[GroupComparison], published: PublishedComparison) -> None:
+    """Print the scores of the strategies next to the published ones."""
     from vedette.campaigns.scores import score_strategies
 
     for group in groups:
@@ -157,19 +170,6 @@ def _print_with_published(
             echo(f"{title}:")
         print_scores((*score_strategies(group), *published.published), group.comparison)
         echo("")
-
-
-def _print_provenance(published: PublishedComparison) -> None:
-    from vedette.campaigns.published import provenance
-
-    for line in provenance(published):
-        console().print(line, style="dim")
-
-
-def _check_claims(published: PublishedComparison, groups: Sequence[GroupComparison]) -> tuple[CheckedClaim, ...]:
-    from vedette.campaigns.published import checked_claims
-
-    return tuple(claim for group in groups for claim in checked_claims(published, group.comparison))
 
 
 def _print_claims(claims: Sequence[CheckedClaim]) -> None:
@@ -187,7 +187,7 @@ def _write(opened: CampaignResults, published: PublishedComparison | None, folde
 
     with interruptible(f"{folder} keeps every run; the same command writes the report"):
         note("drawing the report ...")
-        if published is None:
+        if published is None or published.claims:
             write_summary(opened, folder)
             write_figures(opened, folder / "figures")
         else:  # with a decision at every scan there would be hundreds of figures: `vedette report --figures`

@@ -1,17 +1,17 @@
-"""The commands for saved results: results (of a campaign or a single run), report and upgrade."""
+"""The commands that print, export and upgrade saved results, of a campaign or a single run: results, upgrade."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from vedette.cli.comparisons import print_comparison
 from vedette.cli.completing import one_of
 from vedette.cli.documents import results_document, run_document
-from vedette.cli.errors import check_ending, option_errors, usage_error
+from vedette.cli.errors import check_ending, usage_error
 from vedette.cli.options import ResultsFolder
 from vedette.cli.output import echo, emit_json, note
 from vedette.cli.run_summary import print_run
@@ -27,209 +27,31 @@ if TYPE_CHECKING:
     from vedette.scenarios import Scenario
     from vedette.simulation.records import RunRecord
 
-
-def report(
-    folder: ResultsFolder,
-    out: Annotated[
-        Path | None, typer.Option("--out", metavar="FILE", help="Where the page goes; else report.html in the folder.")
-    ] = None,
-    figures: Annotated[
-        Path | None, typer.Option("--figures", metavar="DIR", help="Write the figures too, as PDF, SVG and PNG.")
-    ] = None,
-    runs: Annotated[
-        str | None,
-        typer.Option(
-            "--runs",
-            metavar="CELL:RUN,...",
-            help="Runs of a campaign to replay. Default: a typical run under every strategy.",
-        ),
-    ] = None,
-    trust: Annotated[
-        bool,
-        typer.Option("--allow-code", help="Run code that the scenarios of the results name, to draw measurements."),
-    ] = False,
-) -> None:
-    """Report on a campaign or a run: one page that opens anywhere, with tables, figures and a replay of runs."""
-    check_ending(out, "--out", "html")
-    require_packages("vedette report", "jinja2", "matplotlib", "pyarrow")
-    from vedette.simulation.storage import holds_run
-
-    replays = None if runs is None else [_parse_cell_and_run(text) for text in runs.split(",")]
-    is_run = holds_run(folder)
-    if is_run and runs is not None:
-        raise usage_error(f"expected of a campaign; {folder} holds a single run", "--runs")
-    page = out or folder / "report.html"
-    with interruptible("what is not yet written is missing; the same command writes it all anew"):
-        written, untrusted_code = (
-            _report_run(folder, page, figures, trust)
-            if is_run
-            else _report_campaign(folder, page, figures, replays, trust)
-        )
-    emit_json({"page": page, "figures": written, "replays_without_measurements": untrusted_code})
-
-
-WrittenReport = tuple[Sequence[Path], Sequence[str]]
-
-
-def _report_campaign(
-    folder: Path, page: Path, figures: Path | None, replays: list[tuple[str, int]] | None, trust: bool
-) -> WrittenReport:
-    """Write the report and figures; return the figures that were written, and the code that was not run."""
-    from vedette.campaigns.results import open_results
-    from vedette.reports import replay_code, write_figures, write_report
-
-    results = open_results(folder, num_workers=0)
-    with option_errors({"path": "--out", "replays": "--runs", "cell": "--runs"}):
-        write_report(results, page, replays=replays, trust=trust)
-    untrusted_code = () if trust else replay_code(results)
-    _print_page(page, untrusted_code)
-    return _figures(figures, lambda path: write_figures(results, path)), untrusted_code
-
-
-def _report_run(folder: Path, page: Path, figures: Path | None, trust: bool) -> WrittenReport:
-    from vedette.evaluation.scans import measurement_code
-    from vedette.reports import write_run_figures, write_run_report
-    from vedette.simulation.storage import read_manifest
-
-    record, scenario = saved_run(folder)
-    with option_errors({"path": "--out"}):
-        write_run_report(record, scenario, page, manifest=read_manifest(folder), trust=trust)
-    untrusted_code = () if trust else measurement_code(scenario)
-    _print_page(page, untrusted_code)
-    return _figures(figures, lambda path: write_run_figures(record, scenario, path)), untrusted_code
-
-
-def _print_page(page: Path, untrusted_code: Sequence[str]) -> None:
-    echo(f"wrote {page}")
-    if untrusted_code:
-        note(f"without measurements, as drawing them runs {', '.join(untrusted_code)}: --allow-code allows it")
-
-
-def _figures(folder: Path | None, write: Callable[[Path], Sequence[Path]]) -> Sequence[Path]:
-    if folder is None:
-        return ()
-    with option_errors({"path": "--figures"}):
-        written = write(folder)
-    echo(f"wrote {len(written)} files to {folder}")
-    return written
-
-
-def saved_run(folder: Path) -> tuple[RunRecord, Scenario]:
-    """Return a saved run and its scenario; raise `VedetteError` for a folder without both."""
-    from vedette.scenarios import load_scenario
-    from vedette.simulation.storage import SCENARIO, load_run
-
-    return load_run(folder), load_scenario(folder / SCENARIO)
-
-
-def _parse_cell_and_run(text: str) -> tuple[str, int]:
-    cell, colon, run = text.strip().rpartition(":")
-    if not colon or not cell or not (run.isascii() and run.isdigit()):
-        raise usage_error(f"expected CELL:RUN, such as jdm:0; got {text.strip()!r}", "--runs")
-    return cell, int(run)
-
-
-def upgrade(
-    path: Annotated[
-        Path,
-        typer.Argument(
-            metavar="PATH",
-            help="Results folder of a campaign or of a single run, scenario or sensors file (YAML), or campaign file "
-            "(TOML).",
-        ),
-    ],
-) -> None:
-    """Bring results, a scenario or sensors file, or a campaign file of an earlier version up to date, in place.
-
-    In files, former keys and values get their present names; comments and layout stay.
-    """
-    if path.is_file():
-        _upgrade_file(path)
-    else:
-        _upgrade_folder(path)
-
-
-def _upgrade_file(path: Path) -> None:
-    if path.with_name("manifest.json").exists():
-        raise usage_error(f"expected the folder of these results, {path.parent}; got a file in it", "PATH")
-    if path.suffix.lower() == ".toml":
-        from vedette.campaigns.renamed import upgrade_campaign_file as upgrade_file
-    else:
-        from vedette.scenarios.upgrading import upgrade_scenario_file as upgrade_file
-    lines = upgrade_file(path)
-    for line in lines:
-        echo(str(line))
-    echo(f"{path}: {pluralise(len(lines), 'change')}" if lines else f"{path}: up to date; nothing was changed")
-    emit_json({"file": path, "changes": [line._asdict() for line in lines]})
-
-
-def _upgrade_folder(folder: Path) -> None:
-    require_packages("vedette upgrade", "pyarrow")
-    with interruptible("nothing is lost; the same command goes on"):
-        from vedette.campaigns.upgrading import upgrade_results
-        from vedette.simulation.serialization import FORMAT_VERSION
-
-        number = upgrade_results(folder)
-        if number == FORMAT_VERSION:
-            echo(f"{folder}: format {number}, which this version reads; nothing was changed")
-        else:
-            echo(f"{folder}: format {number} is now {FORMAT_VERSION}")
-            if (tables := folder / "tables").is_dir():
-                echo(f"next: vedette results {folder} --export {tables}, to write its tables anew")
-        emit_json({"folder": folder, "previous_format": number, "format": FORMAT_VERSION})
-
-
 _MAX_SHOWN_FAILURES = 10
 _FORMATS = ("parquet", "csv", "netcdf")
+Export = Annotated[
+    Path | None, typer.Option("--export", metavar="DIR", help="Folder for the results as files of other tools.")
+]
+Formats = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--format",
+        metavar="NAME",
+        help="Of the files: parquet (default), csv, netcdf; may be repeated.",
+        autocompletion=one_of(*_FORMATS),
+    ),
+]
+TexFile = Annotated[
+    Path | None, typer.Option("--tex", metavar="FILE", help="Write the comparisons as LaTeX tables (booktabs).")
+]
 
 
-def results(
-    folder: ResultsFolder,
-    export: Annotated[
-        Path | None, typer.Option("--export", metavar="DIR", help="Folder for the results as files of other tools.")
-    ] = None,
-    formats: Annotated[
-        list[str] | None,
-        typer.Option(
-            "--format",
-            metavar="NAME",
-            help="Of the files: parquet (default), csv, netcdf; may be repeated.",
-            autocompletion=one_of(*_FORMATS),
-        ),
-    ] = None,
-    tex: Annotated[
-        Path | None, typer.Option("--tex", metavar="FILE", help="Write the comparisons as LaTeX tables (booktabs).")
-    ] = None,
-) -> None:
+def results(folder: ResultsFolder, export: Export = None, formats: Formats = None, tex: TexFile = None) -> None:
     """Print the comparison of a campaign's strategies, and what is still to be run, or a single run; export either."""
-    for name in formats or ():
-        if name not in _FORMATS:
-            raise usage_error(f"expected one of {', '.join(_FORMATS)}; got {name}", "--format")
-    if formats and export is None:
-        raise usage_error("expected with --export, which names the folder", "--format")
-    check_ending(tex, "--tex", "tex")
-    require_packages("vedette results", "pyarrow")
-    if "netcdf" in (formats or ()):
-        require_packages("vedette results --format netcdf", "xarray")
-    from vedette.campaigns.results import open_results
-    from vedette.simulation.storage import holds_run, load_run
+    _check_options(export, formats or (), tex)
+    from vedette.simulation.storage import holds_run
 
-    opened: CampaignResults | RunRecord
-    written: list[Path] = []
-    if holds_run(folder):
-        opened = load_run(folder)
-        scenario = _load_scenario(folder)
-        if tex is not None:
-            raise usage_error(f"expected of a campaign; {folder} holds a single run", "--tex")
-        print_run(opened, scenario)
-        document = run_document(opened, scenario)
-    else:
-        opened = open_results(folder, num_workers=0)
-        groups = opened.comparisons()
-        print_results(opened, groups)
-        document = results_document(opened, groups)
-        if tex is not None:
-            written.append(_write_tex(opened, groups, tex))
+    opened, document, written = _show_run(folder, tex) if holds_run(folder) else _show_campaign(folder, tex)
     if export is not None:
         from vedette.campaigns.export import FORMATS
 
@@ -238,6 +60,40 @@ def results(
     for path in written:
         echo(f"wrote {path}")
     emit_json({**document, "written": written})
+
+
+def _check_options(export: Path | None, formats: Sequence[str], tex: Path | None) -> None:
+    for name in formats:
+        if name not in _FORMATS:
+            raise usage_error(f"expected one of {', '.join(_FORMATS)}; got {name}", "--format")
+    if formats and export is None:
+        raise usage_error("expected with --export, which names the folder", "--format")
+    check_ending(tex, "--tex", "tex")
+    require_packages("vedette results", "pyarrow")
+    if "netcdf" in formats:
+        require_packages("vedette results --format netcdf", "xarray")
+
+
+def _show_run(folder: Path, tex: Path | None) -> tuple[RunRecord, dict[str, Any], list[Path]]:
+    """Print a saved run; return it, its document, and no files."""
+    from vedette.simulation.storage import load_run
+
+    record, scenario = load_run(folder), _load_scenario(folder)
+    if tex is not None:
+        raise usage_error(f"expected of a campaign; {folder} holds a single run", "--tex")
+    print_run(record, scenario)
+    return record, run_document(record, scenario), []
+
+
+def _show_campaign(folder: Path, tex: Path | None) -> tuple[CampaignResults, dict[str, Any], list[Path]]:
+    """Print the results of a campaign; return them, their document, and the file of LaTeX tables if one is written."""
+    from vedette.campaigns.results import open_results
+
+    opened = open_results(folder, num_workers=0)
+    groups = opened.comparisons()
+    print_results(opened, groups)
+    written = [] if tex is None else [_write_tex(opened, groups, tex)]
+    return opened, results_document(opened, groups), written
 
 
 def _write_tex(opened: CampaignResults, groups: Sequence[GroupComparison], path: Path) -> Path:
@@ -310,3 +166,53 @@ def print_progress(opened: CampaignResults) -> None:
     if failures:
         echo(f"failed: {pluralise(len(failures), 'run')}; the same command tries again:")
         print_failures(failures)
+
+
+def upgrade(
+    path: Annotated[
+        Path,
+        typer.Argument(
+            metavar="PATH",
+            help="Results folder of a campaign or of a single run, scenario or sensors file (YAML), or campaign file "
+            "(TOML).",
+        ),
+    ],
+) -> None:
+    """Bring results, a scenario or sensors file, or a campaign file of an earlier version up to date, in place.
+
+    In files, former keys and values get their present names; comments and layout stay.
+    """
+    if path.is_file():
+        _upgrade_file(path)
+    else:
+        _upgrade_folder(path)
+
+
+def _upgrade_file(path: Path) -> None:
+    if path.with_name("manifest.json").exists():
+        raise usage_error(f"expected the folder of these results, {path.parent}; got a file in it", "PATH")
+    if path.suffix.lower() == ".toml":
+        from vedette.campaigns.renamed import upgrade_campaign_file as upgrade_file
+    else:
+        from vedette.scenarios.upgrading import upgrade_scenario_file as upgrade_file
+    lines = upgrade_file(path)
+    for line in lines:
+        echo(str(line))
+    echo(f"{path}: {pluralise(len(lines), 'change')}" if lines else f"{path}: up to date; nothing was changed")
+    emit_json({"file": path, "changes": [line._asdict() for line in lines]})
+
+
+def _upgrade_folder(folder: Path) -> None:
+    require_packages("vedette upgrade", "pyarrow")
+    with interruptible("nothing is lost; the same command goes on"):
+        from vedette.campaigns.upgrading import upgrade_results
+        from vedette.simulation.serialization import FORMAT_VERSION
+
+        number = upgrade_results(folder)
+        if number == FORMAT_VERSION:
+            echo(f"{folder}: format {number}, which this version reads; nothing was changed")
+        else:
+            echo(f"{folder}: format {number} is now {FORMAT_VERSION}")
+            if (tables := folder / "tables").is_dir():
+                echo(f"next: vedette results {folder} --export {tables}, to write its tables anew")
+        emit_json({"folder": folder, "previous_format": number, "format": FORMAT_VERSION})

@@ -87,32 +87,36 @@ def check_planner(scenario: Scenario, name: str, option: str) -> None:
         raise usage_error(f"expected one of {', '.join(names)}; got {name!r}{renamed_strategy(name)}", option)
 
 
+PlannerName = Annotated[
+    str,
+    typer.Option(
+        "--planner",
+        help="jdm (joint), idm (independent), lookahead (joint, several decisions), nearest, assigned_target, "
+        "centroid (rules of thumb), oracle and true_targets (know the targets), random, constant (first course), "
+        "stationary, or the scenario's own.",
+        autocompletion=strategies,
+    ),
+]
+RunNumber = Annotated[int, typer.Option("--run", min=0, help="Number of the run.")]
+Out = Annotated[
+    Path | None, typer.Option("--out", metavar="DIR", help="Folder for the results and figures; none: only print.")
+]
+Threads = Annotated[int, typer.Option("--threads", min=0, help="Threads a decision; 0: one a processor.")]
+
+
 def run(
     scenario: ScenarioName,
-    planner: Annotated[
-        str,
-        typer.Option(
-            "--planner",
-            help="jdm (joint), idm (independent), lookahead (joint, several decisions), nearest, assigned_target, "
-            "centroid (rules of thumb), oracle and true_targets (know the targets), random, constant (first course), "
-            "stationary, or the scenario's own.",
-            autocompletion=strategies,
-        ),
-    ] = "jdm",
+    planner: PlannerName = "jdm",
     seed: Seed = 0,
-    run_number: Annotated[int, typer.Option("--run", min=0, help="Number of the run.")] = 0,
-    out: Annotated[
-        Path | None, typer.Option("--out", metavar="DIR", help="Folder for the results and figures; none: only print.")
-    ] = None,
+    run_number: RunNumber = 0,
+    out: Out = None,
     overwrite: Overwrite = False,
-    threads: Annotated[int, typer.Option("--threads", min=0, help="Threads a decision; 0: one a processor.")] = 0,
+    threads: Threads = 0,
     trust: Trust = False,
 ) -> None:
     """Run a scenario once: tracks, decisions with their rewards, errors, figures."""
-    from vedette.evaluation.runs import run_scenario
     from vedette.scenarios import load_scenario
     from vedette.scenarios.dumping import dump_stored
-    from vedette.simulation.journal import RunInterrupted, RunStopped
     from vedette.simulation.storage import check_target, save_run
 
     loaded = load_scenario(scenario)
@@ -123,16 +127,8 @@ def run(
         require_packages("vedette run --out", "matplotlib", "pyarrow")
         with option_errors({"directory": "--out"}):
             check_target(out, overwrite)
-    stop: RunStopped | RunInterrupted | None = None
     with interruptible("nothing was written"):
-        compile_if_cold(loaded)
-        try:
-            with compiling():
-                record = run_scenario(loaded, planner, seed=seed, run=run_number, num_threads=threads)
-        except (RunStopped, RunInterrupted) as error:
-            if error.record is None:
-                end_stopped(error, "nothing was written")
-            record, stop = error.record, error
+        record, stop = _simulate(loaded, planner, seed, run_number, threads)
         print_run(record, loaded)
         print_recording_warnings(record, loaded)
         saved_to = out if stop is None or not _has_complete_run(out) else None
@@ -147,6 +143,23 @@ def run(
         if stop is not None:
             end_stopped(stop, f"wrote {out}, with the {pluralise(record.num_scans, 'scan')} before")
         echo(f"wrote {out}")
+
+
+def _simulate(
+    scenario: Scenario, planner: str, seed: int, run_number: int, threads: int
+) -> tuple[RunRecord, RunStopped | RunInterrupted | None]:
+    """Return the record of a run, and why it stopped early if it did; exit if it stopped before the first scan."""
+    from vedette.evaluation.runs import run_scenario
+    from vedette.simulation.journal import RunInterrupted, RunStopped
+
+    compile_if_cold(scenario)
+    try:
+        with compiling():
+            return run_scenario(scenario, planner, seed=seed, run=run_number, num_threads=threads), None
+    except (RunStopped, RunInterrupted) as error:
+        if error.record is None:
+            end_stopped(error, "nothing was written")
+        return error.record, error
 
 
 def _has_complete_run(folder: Path | None) -> bool:

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import json
 import re
-from collections.abc import Iterable
+import shutil
+import textwrap
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -21,6 +23,7 @@ if TYPE_CHECKING:
     from vedette.scenarios.diagnostics import Path as Place
 
 SCHEMA_FILE = "vedette.schema.json"
+_MAX_WIDTH = 120  # of the block of assumptions
 
 
 def list_() -> None:
@@ -55,6 +58,26 @@ def init(
     _write_start(_starting_files(load_scenario(source), target), target, overwrite)
 
 
+Pattern = Annotated[
+    str,
+    typer.Option(
+        "--pattern",
+        metavar="NAME",
+        help="spread: groups of targets separate; crowd: they meet.",
+        autocompletion=one_of("spread", "crowd"),
+    ),
+]
+FieldOfView = Annotated[
+    str,
+    typer.Option(
+        "--field-of-view",
+        metavar="NAME",
+        help="limited: sensors see 250 m; full: they see everything.",
+        autocompletion=one_of("limited", "full"),
+    ),
+]
+
+
 def generate(
     path: SceneFile = None,
     sensors: Annotated[int, typer.Option("--sensors", metavar="N", min=1, max=1000, help="Number of sensors.")] = 5,
@@ -62,24 +85,8 @@ def generate(
         int | None,
         typer.Option("--targets", metavar="N", min=1, max=2000, help="Number of targets; default: 2 per sensor."),
     ] = None,
-    pattern: Annotated[
-        str,
-        typer.Option(
-            "--pattern",
-            metavar="NAME",
-            help="spread: groups of targets separate; crowd: they meet.",
-            autocompletion=one_of("spread", "crowd"),
-        ),
-    ] = "spread",
-    view: Annotated[
-        str,
-        typer.Option(
-            "--field-of-view",
-            metavar="NAME",
-            help="limited: sensors see 250 m; full: they see everything.",
-            autocompletion=one_of("limited", "full"),
-        ),
-    ] = "limited",
+    pattern: Pattern = "spread",
+    view: FieldOfView = "limited",
     decide_every: Annotated[
         int, typer.Option("--decide-every", metavar="N", min=1, max=59, help="Scans between decisions, and horizon.")
     ] = 1,
@@ -181,6 +188,17 @@ def print_warnings(scenario: Scenario, more: Iterable[tuple[Place, str]] = ()) -
     for line in lines:
         note(line)
     return lines
+
+
+def note_assumptions(assumed: Mapping[str, str], sensors: Path) -> None:
+    """Print each assumed section and its description, as one aligned block on standard error."""
+    if not assumed:
+        return
+    note(f"Assumed, because {sensors} does not give it:")
+    width = min(shutil.get_terminal_size().columns, _MAX_WIDTH)
+    for section, text in assumed.items():
+        first = f"  {section:<10}  "
+        note(textwrap.fill(text, width, initial_indent=first, subsequent_indent=" " * len(first)))
 
 
 def schema(

@@ -8,14 +8,12 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from vedette.cli.assumptions import note_assumptions
 from vedette.cli.compiling import compiling
 from vedette.cli.completing import one_of
 from vedette.cli.documents import run_document
 from vedette.cli.errors import option_errors, usage_error
-from vedette.cli.options import BAD_ROWS, BadRows, Overwrite, SensorsFile, Speed, Trust
-from vedette.cli.output import echo, emit_json, note
-from vedette.cli.progress import bar
+from vedette.cli.options import BAD_ROWS, BadRows, Overwrite, ScansFile, SensorsFile, Speed, Trust
+from vedette.cli.output import bar, echo, emit_json, note
 from vedette.cli.run_summary import print_run
 from vedette.cli.running import (
     CodeTrust,
@@ -23,7 +21,7 @@ from vedette.cli.running import (
     interruptible,
     print_recording_warnings,
 )
-from vedette.cli.scenario_files import print_warnings
+from vedette.cli.scenario_files import note_assumptions, print_warnings
 from vedette.internal.extras import without
 from vedette.internal.text import pluralise
 
@@ -39,31 +37,36 @@ ON_EARTH = ("geojson", "czml", "mcap")
 _SHOWN_ROWS = 5
 _MIN_ESTIMATES = 10  # smallest number of estimates of a lasting track
 
+TruthFile = Annotated[
+    Path | None,
+    typer.Option("--truth", metavar="FILE", help="Reports of the targets themselves, to compute errors."),
+]
+Out = Annotated[
+    Path | None,
+    typer.Option("--out", metavar="DIR", help="Folder for results, tracks and figures; default: print only."),
+]
+Formats = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--format",
+        metavar="NAME",
+        help="Of the tracks: csv and geojson (default), parquet, czml, mcap. May be repeated.",
+        autocompletion=one_of(*FORMATS),
+    ),
+]
+JoinTracks = Annotated[
+    bool, typer.Option("--join/--no-join", help="Join tracks across gaps, where they are probably of one target.")
+]
+
 
 def track(
-    scans: Annotated[Path, typer.Argument(metavar="SCANS", help="CSV or Parquet file with one row per measurement.")],
+    scans: ScansFile,
     sensors: SensorsFile,
-    truth: Annotated[
-        Path | None,
-        typer.Option("--truth", metavar="FILE", help="Reports of the targets themselves, to compute errors."),
-    ] = None,
-    out: Annotated[
-        Path | None,
-        typer.Option("--out", metavar="DIR", help="Folder for results, tracks and figures; default: print only."),
-    ] = None,
+    truth: TruthFile = None,
+    out: Out = None,
     overwrite: Overwrite = False,
-    formats: Annotated[
-        list[str] | None,
-        typer.Option(
-            "--format",
-            metavar="NAME",
-            help="Of the tracks: csv and geojson (default), parquet, czml, mcap. May be repeated.",
-            autocompletion=one_of(*FORMATS),
-        ),
-    ] = None,
-    join: Annotated[
-        bool, typer.Option("--join/--no-join", help="Join tracks across gaps, where they are probably of one target.")
-    ] = True,
+    formats: Formats = None,
+    join: JoinTracks = True,
     speed: Speed = 10.0,
     bad_rows: BadRows = "refuse",
     trust: Trust = False,
@@ -73,13 +76,7 @@ def track(
     Prints tracks and diagnostics, and errors if the targets' own reports are given. --out writes tracks, tables and
     figures.
     """
-    from vedette.evaluation.joining import joins_of_run, with_joined_tracks
-    from vedette.simulation.storage import check_target
-
-    _check_formats(formats or (), out)
-    if out is not None:
-        with option_errors({"directory": "--out"}):
-            check_target(out, overwrite)
+    _check_output(formats or (), out, overwrite)
     recorded, warnings = read_recording(sensors, scans, truth, speed=speed, bad_rows=bad_rows, trust=trust)
     scenario, recording, assumed = recorded
     if "clutter" in assumed:
@@ -91,29 +88,21 @@ def track(
     with interruptible("nothing was written"):
         record = _run_tracker(scenario, recording)
         print_run(record, scenario)
-        recording_warnings = print_recording_warnings(record, scenario)
-        sizes = pluralise(record.num_scans, "scan"), pluralise(recording.num_measurements, "measurement")
-        echo(f"{scans}: {', '.join(sizes)}, {pluralise(len(scenario.model.sensors), 'sensor')}")
-        joins = joins_of_run(record, scenario) if join else ()
-        echo(f"  tracks      {_describe_tracks(with_joined_tracks(record, joins))}")
-        if joins:
-            echo(f"  joined      {pluralise(len(joins), 'gap')} between labels of one track (--no-join: none)")
+        warnings += print_recording_warnings(record, scenario)
+        joins = _print_tracks(record, recorded, scans, join)
         if out is not None:
             written = _save(record, scenario, out, formats, joins, overwrite=overwrite)
     if out is not None:
-        if missing_package := without("vedette track --out: figures", "matplotlib"):
-            note(missing_package)
-        else:
-            with interruptible(f"wrote {out}, but not all of its figures"):
-                _draw(record, scenario, out)
+        _draw(record, scenario, out)
         echo(f"Wrote {out}: {', '.join(_contents(out, written))}")
-    origin = {"assumptions": assumed, "skipped": recording.skipped, "warnings": [*warnings, *recording_warnings]}
+    origin = {"assumptions": assumed, "skipped": recording.skipped, "warnings": warnings}
     joined = [join._asdict() for join in joins]
     emit_json({**run_document(record, scenario), **origin, "joins": joined, "folder": out, "written": written})
 
 
-def _check_formats(formats: Sequence[str], out: Path | None) -> None:
+def _check_output(formats: Sequence[str], out: Path | None, overwrite: bool) -> None:
     from vedette.evaluation.track_table import check_format
+    from vedette.simulation.storage import check_target
 
     for name in formats:
         if name not in FORMATS:
@@ -121,6 +110,9 @@ def _check_formats(formats: Sequence[str], out: Path | None) -> None:
         check_format(Path(f"tracks.{name}"))
     if formats and out is None:
         raise usage_error("expected with --out, which names the folder", "--format")
+    if out is not None:
+        with option_errors({"directory": "--out"}):
+            check_target(out, overwrite)
 
 
 def _run_tracker(scenario: Scenario, recording: RecordedScans) -> RunRecord:
@@ -188,6 +180,20 @@ def _contents(out: Path, written: list[Path]) -> list[str]:
     return [*names, *figures, *([pluralise(tables, "table")] if tables else [])]
 
 
+def _print_tracks(record: RunRecord, recorded: RecordingScenario, scans: Path, join: bool) -> tuple[Join, ...]:
+    """Print the size of the recording and the number of tracks; return the joins of tracks, none without `join`."""
+    from vedette.evaluation.joining import joins_of_run, with_joined_tracks
+
+    scenario, recording, _ = recorded
+    sizes = pluralise(record.num_scans, "scan"), pluralise(recording.num_measurements, "measurement")
+    echo(f"{scans}: {', '.join(sizes)}, {pluralise(len(scenario.model.sensors), 'sensor')}")
+    joins = joins_of_run(record, scenario) if join else ()
+    echo(f"  tracks      {_describe_tracks(with_joined_tracks(record, joins))}")
+    if joins:
+        echo(f"  joined      {pluralise(len(joins), 'gap')} between labels of one track (--no-join: none)")
+    return joins
+
+
 def _describe_tracks(record: RunRecord) -> str:
     """Return the number of tracks and of lasting tracks, in words."""
     num_estimates: dict[tuple[int, ...], int] = {}
@@ -202,6 +208,10 @@ def _describe_tracks(record: RunRecord) -> str:
 
 
 def _draw(record: RunRecord, scenario: Scenario, out: Path) -> None:
+    if missing_package := without("vedette track --out: figures", "matplotlib"):
+        note(missing_package)
+        return
     from vedette.evaluation.figures import build_scene, save_figure, tracks_figure
 
-    save_figure(tracks_figure(record, scene=build_scene(scenario, record.planner)), out / "figures" / "tracks")
+    with interruptible(f"wrote {out}, but not all of its figures"):
+        save_figure(tracks_figure(record, scene=build_scene(scenario, record.planner)), out / "figures" / "tracks")
