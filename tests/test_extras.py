@@ -222,7 +222,7 @@ def test_only_a_scheduler_needs_the_extra_of_clusters(tmp_path: Path) -> None:
         ("import vedette.gym", "gymnasium and pettingzoo", "gym"),
         ("from vedette.stonesoup import convert", "stonesoup", "stonesoup"),
         ("from vedette.simulation.arrow import write_table; write_table({}, None)", "pyarrow", "campaigns"),
-        ("from vedette.recorded.tables import read_table; read_table('a.parquet')", "pyarrow", "campaigns"),
+        ("from vedette.recorded.files import read_table; read_table('a.parquet')", "pyarrow", "campaigns"),
     ],
 )
 def test_the_library_names_the_extra_too(program: str, names: str, extra: str, tmp_path: Path) -> None:

@@ -26,7 +26,8 @@ from simulation.test_foreign import ais, plot
 from vedette.cli import app
 from vedette.errors import VedetteError
 from vedette.recorded import Cleaning, RecordedTargets
-from vedette.recorded.tables import is_empty, read_table
+from vedette.recorded.files import read_table
+from vedette.recorded.tables import is_empty
 from vedette.scenarios.from_recording import scenario_from_recording
 
 TryCases = Callable[[Callable[[np.random.Generator], object], int], None]

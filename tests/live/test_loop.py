@@ -15,7 +15,7 @@ from live.examples import SYNCHRONOUS, answered, line, small, walk, write_live
 from vedette.errors import InputError
 from vedette.live import MAX_LINE_BYTES, LiveLoop, build_live_loop
 from vedette.recorded import Conventions, Origin, RecordedSensor, parse_scans
-from vedette.recorded.tables import read_table
+from vedette.recorded.files import read_table
 from vedette.scenarios.build import build_experiment
 from vedette.scenarios.from_recording import scenario_from_sensors
 from vedette.tracking import OutOfSequenceTracker, SensorScan

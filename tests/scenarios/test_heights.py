@@ -17,7 +17,8 @@ from vedette.evaluation.track_table import table_of_run, write_tracks
 from vedette.kernels.base.types import OWN_HEIGHT
 from vedette.live.messages import read_message
 from vedette.recorded import Conventions, parse_scans
-from vedette.recorded.tables import Table, read_table
+from vedette.recorded.files import read_table
+from vedette.recorded.tables import Table
 from vedette.scenarios import load_scenario
 from vedette.scenarios.calibration import build_problem
 from vedette.scenarios.from_recording import scenario_from_recording, scenario_from_sensors

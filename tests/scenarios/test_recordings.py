@@ -19,8 +19,9 @@ from vedette.evaluation.scans import scan_table, scans_of_record
 from vedette.evaluation.track_table import table_of_run, write_tracks
 from vedette.models import Bias
 from vedette.recorded import Conventions, Origin, RecordedScans, RecordedSensor, RecordedTargets, as_table, parse_scans
+from vedette.recorded.files import read_table
 from vedette.recorded.reports import parse_reports
-from vedette.recorded.tables import Table, read_table
+from vedette.recorded.tables import Table
 from vedette.scenarios import load_scenario
 from vedette.scenarios.dumping import dump_scenario
 from vedette.scenarios.from_recording import scenario_from_recording

@@ -13,7 +13,7 @@ import pytest
 from recordings import ORIGIN
 from vedette.errors import InputError
 from vedette.recorded import Conventions, RecordedSensor, RecordedTargets, parse_scans
-from vedette.recorded.tables import read_table
+from vedette.recorded.files import read_table
 
 pytest.importorskip("rosbags")  # which is not there for the newest Python
 

@@ -16,7 +16,7 @@ from vedette.errors import InputError
 from vedette.evaluation.runs import run_scenario
 from vedette.models import Bias
 from vedette.recorded import Conventions, Origin, RecordedSensor, RecordedTargets, parse_scans
-from vedette.recorded.tables import read_table
+from vedette.recorded.files import read_table
 from vedette.scenarios.from_recording import scenario_from_recording
 from vedette.scenarios.warnings import scenario_warnings
 

@@ -25,7 +25,7 @@ from vedette.scenarios.loading import parse_scenario
 from vedette.simulation import RunRecord, simulate
 from vedette.simulation.replay import scans_of
 from vedette.simulation.storage import load_run, save_run
-from vedette.simulation.tables import check_record, tables_of
+from vedette.simulation.tables import tables_of
 
 NOISE = "  noise: {kind: constant, std: [0.02, 3.0]}"
 COURSES = f"{NOISE}\n  platform: {{kind: heading, speed: 2.0, headings_deg: [0, 90]}}"
@@ -82,7 +82,7 @@ def test_who_was_off_is_kept(record: RunRecord, tmp_path: Path) -> None:
     assert "off" not in tables_of(replace(record, off=np.zeros_like(record.off)))["sensors"]
     for wrong in (record.off[1:], record.off.astype(float)):
         with pytest.raises(InputError, match=r"record.off: expected booleans of \(20, 2\)"):
-            check_record(replace(record, off=wrong))
+            replace(record, off=wrong).check()
 
 
 @pytest.mark.parametrize("planner", ["jdm", "idm", "lookahead", "true_targets"])

@@ -3,10 +3,11 @@
 from vedette.recorded.cleaning import Cleaning, CleaningCounts, RecordedTrack
 from vedette.recorded.conventions import Conventions
 from vedette.recorded.detections import table_of_detections
+from vedette.recorded.files import read_table
 from vedette.recorded.geography import Origin
 from vedette.recorded.scan_times import RecordedScans, RecordedSensor, remove_biases
 from vedette.recorded.scans import parse_scans
-from vedette.recorded.tables import as_table, read_table
+from vedette.recorded.tables import as_table
 from vedette.recorded.targets import RecordedTargets
 from vedette.recorded.tracking import Tracking
 

@@ -68,7 +68,7 @@ def parse_scans(
     reach or far beyond all others (see `vedette.recorded.extents.wild`); it is listed in `skipped`.
 
     Args:
-        table: see `vedette.recorded.tables.read_table`.
+        table: see `vedette.recorded.files.read_table`.
         sites: the sensors, in the order of the tracker's.
         conventions: of the rows.
         origin: of longitudes and latitudes.

@@ -15,8 +15,9 @@ from vedette.errors import InputError
 from vedette.kernels.base.types import HEIGHT
 from vedette.models.arguments import real, reject
 from vedette.recorded.cleaning import Cleaning, CleaningCounts, RecordedTrack
+from vedette.recorded.files import read_table
 from vedette.recorded.reports import Reports, parse_reports
-from vedette.recorded.tables import as_table, read_table, seconds
+from vedette.recorded.tables import as_table, seconds
 from vedette.simulation.truth import TIME_TOLERANCE, Truth, scan_times
 
 _FIRST_DATE, _LAST_DATE = 1e8, 1e10  # s of the Unix epoch, 1973 and 2286

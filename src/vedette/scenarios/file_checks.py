@@ -36,7 +36,7 @@ def recorded_findings(model: ScenarioModel, folder: FilePath) -> Iterator[Findin
     if not isinstance(recorded, RecordedTargets):
         return
     file = folder / recorded.path
-    from vedette.recorded.tables import ENDINGS
+    from vedette.recorded.files import ENDINGS
 
     if file.suffix.lower() not in ENDINGS:
         wanted = f"a file that ends with {', '.join(ENDINGS)}"
@@ -67,7 +67,8 @@ def _column_findings(recorded: RecordedTargets, file: FilePath) -> Iterator[Find
     """Yield names of columns that a CSV file does not have."""
     if file.suffix.lower() != ".csv":
         return
-    from vedette.recorded.tables import column_names, header_of
+    from vedette.recorded.files import header_of
+    from vedette.recorded.tables import column_names
 
     try:
         with file.open(encoding="utf-8-sig", errors="replace", newline="") as lines:

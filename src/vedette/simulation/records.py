@@ -161,9 +161,32 @@ class RunRecord(TabularRepr):
         """Return the table `scans` as lists."""
         return {name: np.asarray(column).tolist() for name, column in self.scan_columns().items()}
 
+    def check(self) -> None:
+        """Raise `InputError` for a record that contradicts itself or holds an invalid plan."""
+        num_scans = self.num_scans
+        if num_scans == 0:
+            raise InputError("record.times: expected one scan or more; got none")
+        if not np.array_equal(self.truth.times, self.times):
+            raise InputError("record.truth: expected the scan times of the record; got others")
+        self.truth.validate()
+        lengths = {"estimates": len(self.estimates), "poses": len(self.poses)}
+        lengths |= {f"timings[{stage!r}]": len(seconds) for stage, seconds in self.timings.items()}
+        for name, length in lengths.items():
+            if length != num_scans:
+                raise InputError(f"record.{name}: expected one entry for each of {num_scans} scans; got {length}")
+        if self.ospa.shape != (num_scans, 3):
+            raise InputError(f"record.ospa: expected shape {(num_scans, 3)}; got {self.ospa.shape}")
+        if self.off.shape != self.poses.shape[:2] or self.off.dtype != np.bool_:
+            raise InputError(f"record.off: expected booleans of {self.poses.shape[:2]}; got {self.off.shape}")
+        self.health.check(num_scans, self.num_sensors)
+        if self.recording is not None and self.decisions:
+            raise InputError(f"record.decisions: expected none of a recording; got {len(self.decisions)}")
+        for decision in self.decisions:
+            decision.check(self.times, self.poses)
+
     def _summary(self) -> str:
-        known = self.ospa[:, 0][~np.isnan(self.ospa[:, 0])]
-        error = f", mean OSPA {known.mean():.4g}" if len(known) else ""
+        defined = self.ospa[:, 0][~np.isnan(self.ospa[:, 0])]
+        error = f", mean OSPA {defined.mean():.4g}" if len(defined) else ""
         drawn = f"by {elided(self.planner)}, seed {self.seed}, run {self.run}"
         origin = f"of {elided(self.scenario)} {drawn if self.recording is None else f'from {elided(self.source)}'}"
         sizes = f"{pluralise(self.num_scans, 'scan')}, {pluralise(self.num_sensors, 'sensor')}"

@@ -19,7 +19,6 @@ from vedette.simulation.tables import (
     OPTIONAL,
     SUMMARY_TABLES,
     TIMINGS,
-    check_record,
     record_of,
     summary_of,
     tables_of,
@@ -55,7 +54,7 @@ def encode_run(record: RunRecord) -> dict[str, bytes]:
 
     Raises `InputError` for a record that contradicts itself or holds an invalid plan.
     """
-    check_record(record)
+    record.check()
     layouts = {**LAYOUTS, **OPTIONAL}
     return {f"{name}{ENDING}": write_table(table, layouts[name]) for name, table in tables_of(record).items()}
 
@@ -70,7 +69,7 @@ def decode_run(
     tables, spent = _tables(facts, files, place, timings)
     with _errors_naming(place):
         record = record_of(facts, tables, spent)
-        check_record(record)
+        record.check()
     return record
 
 

@@ -50,30 +50,6 @@ OPTIONAL: dict[str, Layout] = {**OWN_REWARDS, **EXPLANATION_TABLES, **UNDETECTED
 TIMINGS = Layout({"step": Kind.INTEGER}, {"": Kind.NUMBER})
 
 
-def check_record(record: RunRecord) -> None:
-    """Raise `InputError` for a record that contradicts itself or holds an invalid plan."""
-    num_scans = record.num_scans
-    if num_scans == 0:
-        raise InputError("record.times: expected one scan or more; got none")
-    if not np.array_equal(record.truth.times, record.times):
-        raise InputError("record.truth: expected the scan times of the record; got others")
-    record.truth.validate()
-    lengths = {"estimates": len(record.estimates), "poses": len(record.poses)}
-    lengths |= {f"timings[{stage!r}]": len(seconds) for stage, seconds in record.timings.items()}
-    for name, length in lengths.items():
-        if length != num_scans:
-            raise InputError(f"record.{name}: expected one entry for each of {num_scans} scans; got {length}")
-    if record.ospa.shape != (num_scans, 3):
-        raise InputError(f"record.ospa: expected shape {(num_scans, 3)}; got {record.ospa.shape}")
-    if record.off.shape != record.poses.shape[:2] or record.off.dtype != np.bool_:
-        raise InputError(f"record.off: expected booleans of {record.poses.shape[:2]}; got {record.off.shape}")
-    record.health.check(num_scans, record.num_sensors)
-    if record.recording is not None and record.decisions:
-        raise InputError(f"record.decisions: expected none of a recording; got {len(record.decisions)}")
-    for decision in record.decisions:
-        decision.check(record.times, record.poses)
-
-
 def tables_of(record: RunRecord) -> Tables:
     """Return the tables of `LAYOUTS` for runs of this kind, and those of `OPTIONAL` that the run has."""
     of_scans = {

@@ -100,7 +100,7 @@ def _read(
 ) -> RecordedScans:
     """Return the scans of a file with this time of change; the section is JSON, as mappings cannot be hashed."""
     from vedette.recorded import Conventions, parse_scans
-    from vedette.recorded.tables import read_table
+    from vedette.recorded.files import read_table
 
     own = RecordingSection.model_validate_json(section)
     conventions = Conventions(own.columns, own.units, own.bearings, own.scan_window, own.bad_rows)
