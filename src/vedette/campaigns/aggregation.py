@@ -40,20 +40,20 @@ def _by_processes(
     if getattr(current_process(), "_inheriting", False):  # a reader running an unguarded main module
         raise VedetteError('a script that reads with workers needs `if __name__ == "__main__":` around the call')
     load_ahead()
-    others = set(active_children())
+    earlier_processes = set(active_children())
     pool = ProcessPoolExecutor(number, context(), initializer=_initialise_reader, initargs=(results, cell))
     try:
         with as_children(of_server=True):
-            found = pool.map(_read, parts)
+            ensembles = pool.map(_read, parts)
         let_go_of_results(pool)
-        yield from found
+        yield from ensembles
     except BrokenProcessPool as error:
         raise VedetteError(
             "workers: expected processes that read runs; one has died: for want of memory, or, in a script of your "
             'own, as the call that reads is not under `if __name__ == "__main__":`'
         ) from error
     except BaseException:  # Ctrl-C or a damaged run: the other readers would take seconds in vain
-        for reader in set(active_children()) - others:
+        for reader in set(active_children()) - earlier_processes:
             reader.kill()
         raise
     finally:

@@ -82,12 +82,12 @@ class Scene:
 @cache
 def scenes() -> dict[str, Scene]:
     """Return all scenes by name."""
-    found = {}
+    by_name = {}
     data: dict[Role, Any] = tomllib.loads(_FILE.read_text(encoding="utf-8"))  # type: ignore[assignment] # role keys
-    for role, said in data.items():
-        for each in said["scenes"]:
-            found[each["name"]] = Scene(role=role, beside=tuple(said["beside"]), **each)
-    return found
+    for role, section in data.items():
+        for fields in section["scenes"]:
+            by_name[fields["name"]] = Scene(role=role, beside=tuple(section["beside"]), **fields)
+    return by_name
 
 
 @dataclass(frozen=True, slots=True)
@@ -105,30 +105,30 @@ class Entrant:
     section: dict[str, Any]
 
 
-def entrant(role: Role, said: str, *, seconds: float, folder: Path) -> Entrant:
+def entrant(role: Role, text: str, *, seconds: float, folder: Path) -> Entrant:
     """Return the entrant given as `NAME=COMMAND`, `NAME=file.py:attribute` or `NAME=package.module:attribute`.
 
     Args:
         role: planner or tracker.
-        said: the text.
+        text: the entrant in one of these forms.
         seconds: time limit of a program for an answer.
         folder: working directory of commands; file names are relative to it.
 
     Raises `InputError` for another text, or a name that is unfit for a folder or used by the library.
     """
-    name, sign, what = said.partition("=")
-    taken = {OWN, *(own for scene in scenes().values() for own in scene.beside)}
-    if not sign or not what.strip() or not name or safe_name(name) != name or name.startswith((".", "-")):
-        raise InputError(f"{role}: expected NAME=COMMAND or NAME=file.py:attribute; got {said!r}")
+    name, sign, target = text.partition("=")
+    taken = {OWN, *(strategy for scene in scenes().values() for strategy in scene.beside)}
+    if not sign or not target.strip() or not name or safe_name(name) != name or name.startswith((".", "-")):
+        raise InputError(f"{role}: expected NAME=COMMAND or NAME=file.py:attribute; got {text!r}")
     if name in taken:
         raise InputError(f"{role}: expected another name than {', '.join(sorted(taken))}; got {name!r}")
-    if re.fullmatch(r"[\w.]+:[\w.]+|[^:\s]+\.py:[\w.]+", what):
-        module, _, attribute = what.rpartition(":")
-        place = str((folder / module).resolve()) if module.endswith(".py") else module
-        if module.endswith(".py") and not Path(place).is_file():
-            raise InputError(f"{role} {name}: expected a file; got {place}")
-        return Entrant(name, role, {"kind": "custom", "function": f"{place}:{attribute}"})
-    command = {"command": shlex.split(what), "folder": str(folder.resolve()), "seconds": seconds}
+    if re.fullmatch(r"[\w.]+:[\w.]+|[^:\s]+\.py:[\w.]+", target):
+        module, _, attribute = target.rpartition(":")
+        source = str((folder / module).resolve()) if module.endswith(".py") else module
+        if module.endswith(".py") and not Path(source).is_file():
+            raise InputError(f"{role} {name}: expected a file; got {source}")
+        return Entrant(name, role, {"kind": "custom", "function": f"{source}:{attribute}"})
+    command = {"command": shlex.split(target), "folder": str(folder.resolve()), "seconds": seconds}
     return Entrant(name, role, {"kind": "program", **command})
 
 
@@ -138,22 +138,22 @@ def campaign_of(scene: Scene, entrant: Entrant | None, runs: int, seed: int, fol
     folder: folder of the benchmark. how: see `resolve`.
     """
     names = scene.beside if entrant is None else (entrant.name,)
-    given: dict[str, Any] = {"name": f"{scene.name}-{OWN if entrant is None else entrant.name}", "runs": runs}
-    given |= {"seed": seed, "scenarios": (scene.scenario(folder / "scenes"),)}
+    fields: dict[str, Any] = {"name": f"{scene.name}-{OWN if entrant is None else entrant.name}", "runs": runs}
+    fields |= {"seed": seed, "scenarios": (scene.scenario(folder / "scenes"),)}
     if scene.role == "planner":
-        own: Any = {} if entrant is None else {"planners": {entrant.name: entrant.section}}
-        spec = CampaignSpec(**given, planners=names, set=own)
+        settings: Any = {} if entrant is None else {"planners": {entrant.name: entrant.section}}
+        spec = CampaignSpec(**fields, planners=names, set=settings)
     else:
         filters = _TRACKERS if entrant is None else {entrant.name: entrant.section}
         variants = [
             {"name": name, "set": {"fusion": {"kind": "central", "filter": filters[name]}} if filters[name] else {}}
             for name in names
         ]
-        spec = CampaignSpec(**given, planners=("stationary",), variants=variants, compare="variant")  # type: ignore[arg-type]
+        spec = CampaignSpec(**fields, planners=("stationary",), variants=variants, compare="variant")  # type: ignore[arg-type]
     return resolve(spec, **how)
 
 
-def check_entrant(own: Entrant, campaign: Campaign) -> None:
+def check_entrant(entrant: Entrant, campaign: Campaign) -> None:
     """Create an entrant on the scene of a campaign, and start it once if it is a program.
 
     Raises `InputError` if this fails: typos in a command are reported here and not as lost runs.
@@ -167,9 +167,9 @@ def check_entrant(own: Entrant, campaign: Campaign) -> None:
             if isinstance(section, ProgramSection):
                 program = section.call_arguments(scenario.folder)
                 scene, seconds = scene_for_program(scenario), program["start_seconds"]
-                start_program(program["command"], program["folder"], own.role, scene, rng, seconds)
+                start_program(program["command"], program["folder"], entrant.role, scene, rng, seconds)
     except VedetteError as error:
-        raise InputError(f"{own.role} {own.name}: expected one that can be started; {error}") from None
+        raise InputError(f"{entrant.role} {entrant.name}: expected one that can be started; {error}") from None
 
 
 def clear_stale_results(campaign: Campaign, folder: Path) -> None:
@@ -179,8 +179,8 @@ def clear_stale_results(campaign: Campaign, folder: Path) -> None:
     """
     if not (folder / MANIFEST).is_file() or read_manifest(folder)["digest"] == campaign.digest():
         return
-    there = open_results(folder)
-    if any(there.finished(cell.name) for cell in there.campaign.cells):
+    results = open_results(folder)
+    if any(results.finished(cell.name) for cell in results.campaign.cells):
         raise InputError(
             f"{folder}: expected runs of {folder.name} as it is now; got those of another program, scene or seed "
             "of that name (enter it under another name, or remove the folder)"

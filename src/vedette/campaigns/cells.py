@@ -79,11 +79,11 @@ class Campaign(SummaryRepr):
     @property
     def total(self) -> int:
         """Number of runs to execute, over all cells."""
-        return sum(len(self.runs(place)) for place in range(len(self.cells)))
+        return sum(len(self.runs(index)) for index in range(len(self.cells)))
 
-    def runs(self, place: int) -> Sequence[int]:
-        """Return the increasing numbers of the runs to execute of the cell at that place."""
-        return self.shard.runs(place, len(self.cells), self.num_runs)
+    def runs(self, index: int) -> Sequence[int]:
+        """Return the increasing numbers of the runs to execute of the cell with that index."""
+        return self.shard.runs(index, len(self.cells), self.num_runs)
 
     @property
     def default_folder(self) -> str:
@@ -220,9 +220,9 @@ def _name(settings: Mapping[str, Any], axes: Mapping[str, tuple[Any, ...]]) -> s
     for axis, value in settings.items():
         if isinstance(value, list | dict):
             value = axes[axis].index(value) + 1
-        known = axis in ("scenario", "planner", "variant", *_SECTIONS)
+        is_named_axis = axis in ("scenario", "planner", "variant", *_SECTIONS)
         text = Path(value).stem if axis == "scenario" else str(value)
-        parts.append(text if known else f"{axis.rpartition('.')[2]}-{text}")
+        parts.append(text if is_named_axis else f"{axis.rpartition('.')[2]}-{text}")
     text = safe_name("-".join(parts))
     if len(text) <= _LONGEST_NAME:
         return text

@@ -165,8 +165,8 @@ def _check_scheduler(address: str, refusal: str) -> None:
 
     async def ask() -> object:
         arguments = Security().get_connection_args("client")
-        async with rpc(address, timeout=_CONNECT_SECONDS, connection_args=arguments) as there:
-            return await there.identity()
+        async with rpc(address, timeout=_CONNECT_SECONDS, connection_args=arguments) as remote:
+            return await remote.identity()
 
     def wait() -> None:
         try:

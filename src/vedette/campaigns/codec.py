@@ -64,10 +64,10 @@ def upgraded(payload: bytes, number: int, strategies: Mapping[str, str]) -> byte
     return encode(serialization.decode_run(upgraded_facts(facts, strategies), files, "run"))
 
 
-def _members(payload: bytes, wanted: Container[str] | None = None) -> tuple[dict[str, Any], dict[str, bytes]]:
+def _members(payload: bytes, names: Container[str] | None = None) -> tuple[dict[str, Any], dict[str, bytes]]:
     """Return the facts that identify a run, and its files."""
     try:
-        members = read_members(payload, wanted)
+        members = read_members(payload, names)
         facts = parse_json(members[_RUN])
         if not isinstance(facts, dict):
             raise TypeError(f"{_RUN} does not name one")

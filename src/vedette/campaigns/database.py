@@ -85,13 +85,13 @@ class Reader:
     def entries(self, cell: str, runs: Sequence[int]) -> Iterator[Entry]:
         """Yield finished runs of a cell, read a few hundred at a time; raises as `entry`."""
         for start in range(0, len(runs), _AT_ONCE):
-            few = runs[start : start + _AT_ONCE]
-            question = f"SELECT {COLUMNS} FROM runs WHERE cell = ? AND run IN ({', '.join('?' * len(few))})"
-            found = {row[1]: row for row in self._ask(question, (cell, *few), place_of(cell, few[0]))}
-            for run in few:
-                if run not in found:
+            batch = runs[start : start + _AT_ONCE]
+            question = f"SELECT {COLUMNS} FROM runs WHERE cell = ? AND run IN ({', '.join('?' * len(batch))})"
+            rows = {row[1]: row for row in self._ask(question, (cell, *batch), place_of(cell, batch[0]))}
+            for run in batch:
+                if run not in rows:
                     raise InputError(f"{self._path}: {place_of(cell, run)}expected a finished run; it is not there yet")
-                entry = verified(found[run])
+                entry = verified(rows[run])
                 if entry is None:
                     raise InputError(f"{self._path}: {place_of(cell, run)}{ALTERED}")
                 yield entry
@@ -162,9 +162,9 @@ def lock_of(folder: Path) -> sqlite3.Connection:
     return lock
 
 
-def check_contents(path: Path, found: Sequence[tuple[str]], *contents: str) -> None:
+def check_contents(path: Path, rows: Sequence[tuple[str]], *contents: str) -> None:
     """Raise `InputError` unless the file contains only the checksum of the manifest, or one of several."""
-    if list(found) not in [[(each,)] for each in contents]:
+    if list(rows) not in [[(each,)] for each in contents]:
         raise InputError(
             f"{path}: expected the runs of the manifest beside it; they are another campaign's, or the manifest was "
             "altered"

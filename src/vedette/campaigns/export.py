@@ -91,13 +91,13 @@ def _write_tables(
     Until all columns are known, parts are kept in temporary files.
     """
     parts = [tables_of_record(results)] if isinstance(results, RunRecord) else results.table_parts()
-    waiting: dict[str, dict[Path, pa.Schema]] = {}
+    schemas_of_tables: dict[str, dict[Path, pa.Schema]] = {}
     with tempfile.TemporaryDirectory() as place:
         for number, part in enumerate(parts):
             for name, table in part.items():
                 path = _put(table, Path(place) / f"{name}-{number}.arrow")
-                waiting.setdefault(name, {})[path] = table.schema
-        return tuple(_join(of, folder / f"{name}{ending}", write) for name, of in waiting.items())
+                schemas_of_tables.setdefault(name, {})[path] = table.schema
+        return tuple(_join(schemas, folder / f"{name}{ending}", write) for name, schemas in schemas_of_tables.items())
 
 
 def _put(table: pa.Table, path: Path) -> Path:

@@ -44,9 +44,9 @@ class Writer:
                     opened.execute(statement)
                 opened.execute("INSERT INTO campaign VALUES (?)", (contents,))
             database.check_tables(self._path, opened)
-            found = opened.execute("SELECT contents FROM campaign").fetchall()
+            rows = opened.execute("SELECT contents FROM campaign").fetchall()
             opened.execute("COMMIT")
-        database.check_contents(self._path, found, contents, *others)
+        database.check_contents(self._path, rows, contents, *others)
 
     def put(self, rows: Sequence[Row], session: int) -> None:
         """Store runs, all or none; when this returns they survive any failure of this process or machine.
@@ -124,8 +124,8 @@ class Writer:
         """Copy a run; return True if it was new."""
         if self._database.execute(_INSERT.replace("INSERT", "INSERT OR IGNORE", 1), row).rowcount:
             return True
-        kept = "SELECT payload_sha256 FROM runs WHERE cell = ? AND run = ?"
-        if self._database.execute(kept, row[:2]).fetchone() != (row[4],):
+        stored_checksum = "SELECT payload_sha256 FROM runs WHERE cell = ? AND run = ?"
+        if self._database.execute(stored_checksum, row[:2]).fetchone() != (row[4],):
             place = database.place_of(*row[:2])
             raise InputError(f"{reader}: {place}expected the bytes that another folder has of it; got others")
         return False

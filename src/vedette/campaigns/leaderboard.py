@@ -84,8 +84,8 @@ class SceneTable:
 def scene_table(scene: Scene, folder: Path) -> SceneTable | None:
     """Return the table of a scene from the folder of a benchmark; None if the first strategy has no run there."""
     place = folder / scene.name
-    found = [each for each in sorted(place.iterdir()) if each.is_dir()] if place.is_dir() else []
-    opened = [open_results(each) for each in sorted(found, key=lambda each: (each.name != OWN, each.name))]
+    folders = [each for each in sorted(place.iterdir()) if each.is_dir()] if place.is_dir() else []
+    opened = [open_results(each) for each in sorted(folders, key=lambda each: (each.name != OWN, each.name))]
     tried = [each for results in opened for each in _tried(scene, results)]
     if not tried or tried[0][0].label != scene.beside[0]:
         return None
@@ -93,7 +93,7 @@ def scene_table(scene: Scene, folder: Path) -> SceneTable | None:
     scenario = opened[0].campaign.cells[0].scenario
     model = scenario.model.model_copy(update={"planners": {}, "metrics": {}})
     text = dump_scenario(model, folder=scenario.folder)
-    others = [replace(own, difference=_difference(ospa, first)) for own, ospa in tried[1:]]
+    others = [replace(row, difference=_difference(ospa, first)) for row, ospa in tried[1:]]
     standings = (tried[0][0], *others)
     entrants = {each.folder.name: str(each.manifest["digest"]) for each in opened if each.folder.name != OWN}
     return SceneTable(scene, scenario.model.ospa.unit, hashlib.sha256(text.encode()).hexdigest(), entrants, standings)
@@ -156,30 +156,30 @@ def _mean(values: Floats) -> float:
 def header(table: SceneTable) -> tuple[str, ...]:
     """Return the column names of `row`."""
     unit, first = table.unit, table.scene.beside[0]
-    spent = "ms a decision" if table.scene.role == "planner" else "ms a scan"
-    ours = named_in("OSPA", unit), named_in(f"More than {first}", unit), "95 %"
-    names = (*ours, *tail_header(unit), "N error", "NEES", "NEES, 95 %", spent)
+    time_title = "ms a decision" if table.scene.role == "planner" else "ms a scan"
+    ospa_titles = named_in("OSPA", unit), named_in(f"More than {first}", unit), "95 %"
+    names = (*ospa_titles, *tail_header(unit), "N error", "NEES", "NEES, 95 %", time_title)
     counts = ("Filter steps", "Fusions", "Rewards") if table.scene.role == "planner" else ()
     return (table.scene.role.capitalize(), *names, *counts, "Lost", "Runs")
 
 
-def row(table: SceneTable, own: LeaderboardRow) -> tuple[str, ...]:
+def row(table: SceneTable, standing: LeaderboardRow) -> tuple[str, ...]:
     """Return one row under `header`; empty cells where values are not known."""
-    more, nees = own.difference, own.nees
-    counts = [_known(own.counts[name], ",.0f") for name in COUNTED] if table.scene.role == "planner" else []
+    more, nees = standing.difference, standing.nees
+    counts = [_known(standing.counts[name], ",.0f") for name in COUNTED] if table.scene.role == "planner" else []
     return (
-        own.label,
-        _known(float(own.ospa.mean), ".2f"),
+        standing.label,
+        _known(float(standing.ospa.mean), ".2f"),
         "" if more is None else _known(float(more.mean), "+.2f"),
         "" if more is None else _interval(more, "+.2f"),
-        *own.tail.cells(),
-        _known(own.cardinality_error, "+.2f"),
+        *standing.tail.cells(),
+        _known(standing.cardinality_error, "+.2f"),
         "" if nees is None else _known(float(nees.mean), ".2f"),
         "" if nees is None else _interval(nees, ".2f"),
-        _known(1e3 * own.seconds, ".3g"),
+        _known(1e3 * standing.seconds, ".3g"),
         *counts,
-        str(own.num_lost) if own.num_lost else "",
-        str(own.num_runs),
+        str(standing.num_lost) if standing.num_lost else "",
+        str(standing.num_runs),
     )
 
 
@@ -198,11 +198,11 @@ def _interval(summary: Summary, form: str) -> str:
 
 def benchmark_provenance(tables: Sequence[SceneTable], seed: int) -> dict[str, str]:
     """Return seed, versions, and SHA-256 of the scenarios and entrants of the tables, by name."""
-    found = {"seed": str(seed), **versions()}
+    facts = {"seed": str(seed), **versions()}
     for table in tables:
-        found[f"scene {table.scene.name}"] = table.digest
-        found |= {f"{table.scene.role} {name}, {table.scene.name}": digest for name, digest in table.entrants.items()}
-    return found
+        facts[f"scene {table.scene.name}"] = table.digest
+        facts |= {f"{table.scene.role} {name}, {table.scene.name}": digest for name, digest in table.entrants.items()}
+    return facts
 
 
 def benchmark_markdown(tables: Sequence[SceneTable], facts: Mapping[str, str]) -> str:
@@ -210,8 +210,8 @@ def benchmark_markdown(tables: Sequence[SceneTable], facts: Mapping[str, str]) -
     lines = ["# The benchmark of the field", ""]
     for table in tables:
         lines += [f"## {table.scene.name}", "", f"{table.scene.about}.", ""]
-        lines += [markdown_table(header(table), [row(table, own) for own in table.standings]), ""]
-        lines += [f"Lost, {own.label}: {own.reason}\n" for own in table.standings if own.reason]
+        lines += [markdown_table(header(table), [row(table, standing) for standing in table.standings]), ""]
+        lines += [f"Lost, {standing.label}: {standing.reason}\n" for standing in table.standings if standing.reason]
     return "\n".join([*lines, "## Of what", "", *(f"- {name}: `{value}`" for name, value in facts.items()), ""])
 
 
@@ -234,19 +234,19 @@ def benchmark_csv(tables: Sequence[SceneTable]) -> str:
     write = csv.writer(out, lineterminator="\n").writerow
     write(("scene", "scene_sha256", "role", "strategy", "is_own", "unit", *names))
     for table in tables:
-        for own in table.standings:
-            summaries = [own.ospa, own.difference, own.nees]
+        for standing in table.standings:
+            summaries = [standing.ospa, standing.difference, standing.nees]
             parts = [["", "", ""] if each is None else [each.mean, each.low, each.high] for each in summaries]
             numbers = [
                 *parts[0],
-                *own.tail,
+                *standing.tail,
                 *parts[1],
-                own.cardinality_error,
+                standing.cardinality_error,
                 *parts[2],
-                own.seconds,
-                *own.counts.values(),
+                standing.seconds,
+                *standing.counts.values(),
             ]
-            told = [("" if value == "" or np.isnan(value) else repr(float(value))) for value in numbers]
-            start = [table.scene.name, table.digest, table.scene.role, own.label, int(own.is_own), table.unit]
-            write([*start, *told, own.num_lost, own.num_runs])
+            texts = [("" if value == "" or np.isnan(value) else repr(float(value))) for value in numbers]
+            start = [table.scene.name, table.digest, table.scene.role, standing.label, int(standing.is_own), table.unit]
+            write([*start, *texts, standing.num_lost, standing.num_runs])
     return out.getvalue()

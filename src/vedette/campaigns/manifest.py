@@ -191,14 +191,14 @@ def campaign_of(folder: Path, manifest: Mapping[str, Any]) -> Campaign:
 def _check_same_as(specification: CampaignSpec, manifest: Mapping[str, Any]) -> None:
     """Raise `InputError` unless the cells are those of the specification, each with a name that is fit for a file."""
     axes, settings = specification.axes(), specification.settings()
-    for field, value, wanted in (
+    for field, value, expected in (
         ("name", manifest["name"], specification.name),
         ("seed", manifest["seed"], specification.seed),
         ("axes", manifest["axes"], axes),
         ("settings", [cell["settings"] for cell in manifest["cells"]], settings),
-        ("planner", [cell["planner"] for cell in manifest["cells"]], [one["planner"] for one in settings]),
+        ("planner", [cell["planner"] for cell in manifest["cells"]], [setting["planner"] for setting in settings]),
     ):
-        if json.dumps(value) != json.dumps(wanted):  # compared as text, as 1, 1.0 and True are equal in Python
+        if json.dumps(value) != json.dumps(expected):  # compared as text, as 1, 1.0 and True are equal in Python
             raise InputError(f"{field}: expected what the specification says; got other values")
     names = [cell["name"] for cell in manifest["cells"]]
     if len(set(names)) < len(names) or any(name != safe_name(name) or name in ("", ".", "..") for name in names):

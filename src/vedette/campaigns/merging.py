@@ -68,11 +68,11 @@ def merge(folders: Sequence[Path | str], out: Path | str | None = None, *, table
             two folders have with different bytes. `out` is then unchanged.
     """
     places = _places(folders)
-    whole, shares = _read(places)
-    target = Path(results_folder(whole["name"]) if out is None else out)
+    manifest, shares = _read(places)
+    target = Path(results_folder(manifest["name"]) if out is None else out)
     if any(target.resolve() == place.resolve() for place in places):
         raise InputError(f"{target}: expected a folder for the results beside those that are merged; it is one of them")
-    num_added = _fill(target, whole, shares)
+    num_added = _fill(target, manifest, shares)
     results = open_results(target)
     count = max(share.shard.count for share in shares)
     lacking = _lacking(results, count)
@@ -97,14 +97,14 @@ def _lacking(results: CampaignResults, count: int) -> Ints:
 
 def _places(folders: Sequence[Path | str]) -> list[Path]:
     """Return the results folders among these folders, or inside them, each once."""
-    found: dict[Path, Path] = {}
+    by_path: dict[Path, Path] = {}
     for folder in map(Path, folders):
         inside = sorted(folder.glob(f"*/{MANIFEST}")) if folder.is_dir() else []
         places = [folder] if (folder / MANIFEST).exists() else [each.parent for each in inside]
         if not places:
             raise InputError(f"{folder}: expected the results folder of a shard, or a folder that such are in")
-        found |= {place.resolve(): place for place in places}
-    return list(found.values())
+        by_path |= {place.resolve(): place for place in places}
+    return list(by_path.values())
 
 
 @dataclass(frozen=True, slots=True)
@@ -119,50 +119,50 @@ class _Share:
 
 def _read(places: Sequence[Path]) -> tuple[dict[str, Any], list[_Share]]:
     """Return the merged manifest; raises `InputError`, naming the folder, for one of another campaign."""
-    whole: dict[str, Any] = {}
+    merged: dict[str, Any] = {}
     shares: list[_Share] = []
     for place in places:
         manifest = {"shard": None, **read_manifest(place)}
         shard = parse_shard(manifest.pop("shard") or "1/1")
         shares.append(_Share(place, shard, tuple(manifest["sessions"]), contents_checksum(manifest)))
         try:
-            whole = _joined(place, manifest, whole) if whole else manifest
+            merged = _joined(place, manifest, merged) if merged else manifest
         except InputError as error:
             raise InputError(f"{error} (here: {places[0]} and those that agree with it)") from error
-    return whole, shares
+    return merged, shares
 
 
-def _joined(place: Path, manifest: dict[str, Any], whole: dict[str, Any]) -> dict[str, Any]:
+def _joined(place: Path, manifest: dict[str, Any], merged: dict[str, Any]) -> dict[str, Any]:
     """Return the merged manifest extended by the runs and sessions of the manifest in that place."""
-    check_same_campaign(place, manifest, whole)
-    wanted = next((session["versions"] for session in whole["sessions"]), None)
+    check_same_campaign(place, manifest, merged)
+    versions = next((session["versions"] for session in merged["sessions"]), None)
     for session in manifest["sessions"]:
-        for name, version in (wanted or session["versions"]).items():
-            if (there := session["versions"].get(name, "absent")) != version:
+        for name, version in (versions or session["versions"]).items():
+            if (other := session["versions"].get(name, "absent")) != version:
                 raise InputError(
                     f"{place}: expected runs of the same versions as the folders before it, as others may differ in "
-                    f"their last digits; {name} is {there} there and {version} here"
+                    f"their last digits; {name} is {other} there and {version} here"
                 )
-    new = [session for session in manifest["sessions"] if session not in whole["sessions"]]
-    num_runs = max(whole["num_runs"], manifest["num_runs"])
-    created = min(whole["created"], manifest["created"])
-    return {**whole, "num_runs": num_runs, "created": created, "sessions": whole["sessions"] + new}
+    new = [session for session in manifest["sessions"] if session not in merged["sessions"]]
+    num_runs = max(merged["num_runs"], manifest["num_runs"])
+    created = min(merged["created"], manifest["created"])
+    return {**merged, "num_runs": num_runs, "created": created, "sessions": merged["sessions"] + new}
 
 
-def _fill(target: Path, whole: dict[str, Any], shares: Sequence[_Share]) -> int:
+def _fill(target: Path, merged: dict[str, Any], shares: Sequence[_Share]) -> int:
     """Copy the runs into the target; return how many are new."""
     make_folder(target)
     started = (target / MANIFEST).exists()
     writer = Writer(target)
     try:
         if started:  # the existing sessions come first, as the runs refer to them by position
-            whole = _joined(target, whole, read_manifest(target))
-            writer.open_runs(contents_checksum(whole))
-        write_manifest(target, whole)
+            merged = _joined(target, merged, read_manifest(target))
+            writer.open_runs(contents_checksum(merged))
+        write_manifest(target, merged)
         if not started:
-            writer.open_runs(contents_checksum(whole))
+            writer.open_runs(contents_checksum(merged))
         num_added = writer.copy_missing(
-            (_reader(share), _session(share, whole)) for share in shares if _has_begun(share)
+            (_reader(share), _session(share, merged)) for share in shares if _has_begun(share)
         )
     except BaseException:
         writer.close()
@@ -188,9 +188,9 @@ def _reader(share: _Share) -> Reader:
     return reader
 
 
-def _session(share: _Share, whole: dict[str, Any]) -> Callable[[int], int]:
+def _session(share: _Share, merged: dict[str, Any]) -> Callable[[int], int]:
     """Return a function from the session numbers of a shard to those of the merged manifest."""
-    numbers: list[int] = [whole["sessions"].index(session) + 1 for session in share.sessions]
+    numbers: list[int] = [merged["sessions"].index(session) + 1 for session in share.sessions]
 
     def number(session: int) -> int:
         if not 1 <= session <= len(numbers):

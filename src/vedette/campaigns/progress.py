@@ -69,9 +69,9 @@ class Progress(ProgressObserver):
     def begin(self, num_existing: int, num_runs: int) -> None:
         """See `vedette.campaigns.ProgressObserver`."""
         self._existing, self._total = num_existing, num_runs
-        there = f", {num_existing} are there already" if num_existing else ""
+        existing = f", {num_existing} are there already" if num_existing else ""
         if num_existing < num_runs and (num_existing or not self._terminal):
-            self.note(f"{self._name}: {num_runs} runs{there}")
+            self.note(f"{self._name}: {num_runs} runs{existing}")
         self._bar.update(self._bars, total=num_runs, completed=num_existing, description=f"{num_existing}/{num_runs}")
 
     def note(self, text: str) -> None:

@@ -76,21 +76,21 @@ def published_comparisons() -> dict[str, PublishedComparison]:
     return {
         name: PublishedComparison(
             spec=load_spec(name),
-            title=said["title"],
-            source=said["source"],
-            remark=said["remark"],
-            published=tuple(map(_published, said["rows"])),
-            claims=tuple(PublishedOrder(**each) for each in said.get("claims", ())),
-            decisions=tuple(PublishedDecision(**each) for each in said.get("decisions", ())),
+            title=entry["title"],
+            source=entry["source"],
+            remark=entry["remark"],
+            published=tuple(map(_published, entry["rows"])),
+            claims=tuple(PublishedOrder(**each) for each in entry.get("claims", ())),
+            decisions=tuple(PublishedDecision(**each) for each in entry.get("decisions", ())),
         )
-        for name, said in published.items()
+        for name, entry in published.items()
     }
 
 
 def published_comparison_of(campaign: Campaign) -> PublishedComparison | None:
     """Return the published comparison that a campaign runs; None for other campaigns."""
-    found = published_comparisons().get(campaign.name)
-    return found if found is not None and list(found.spec.scenarios) == list(campaign.axes["scenario"]) else None
+    match = published_comparisons().get(campaign.name)
+    return match if match is not None and list(match.spec.scenarios) == list(campaign.axes["scenario"]) else None
 
 
 def checked_claims(reference: PublishedComparison, comparison: Comparison) -> tuple[CheckedClaim, ...]:
@@ -103,13 +103,13 @@ def _checked_orders(reference: PublishedComparison, comparison: Comparison) -> I
         if not {better, than} <= set(comparison.strategies) or comparison.num_runs < 2:
             continue
         paired = comparison.difference(than, better)
-        mean, low, high = (float(getattr(paired.summary, each)) for each in ("mean", "low", "high"))
+        mean, low, high = (float(getattr(paired.summary, field)) for field in ("mean", "low", "high"))
         shown = with_unit(with_minus(f"{mean:+.2f}"), comparison.unit)
         interval = with_unit(with_minus(f"{low:+.2f} to {high:+.2f}"), comparison.unit)
         evidence = f"{than} minus {better}: {shown}, 95 % interval {interval}"
-        known = paired.p_value <= 1.0 - CONFIDENCE
+        is_significant = paired.p_value <= 1.0 - CONFIDENCE
         yield CheckedClaim(
-            text, "undecided" if not known else "reproduced" if mean > 0.0 else "not reproduced", evidence
+            text, "undecided" if not is_significant else "reproduced" if mean > 0.0 else "not reproduced", evidence
         )
 
 

@@ -44,20 +44,20 @@ def spec_changes(data: Mapping[str, Any]) -> Iterator[Change]:
 def _field_changes(fields: Any, path: Keys, *, are_lists: bool = False) -> Iterator[Change]:
     for field, value in fields.items() if isinstance(fields, Mapping) else ():
         present = present_field(field)
-        at = tuple(present.split("."))
+        present_path = tuple(present.split("."))
         if are_lists and isinstance(value, list):
             for index, each in enumerate(value):
-                yield from changes(each, at, (*path, field, index))
+                yield from changes(each, present_path, (*path, field, index))
         else:
-            yield from changes(value, at, (*path, field))
+            yield from changes(value, present_path, (*path, field))
         if present != field:
             yield Change((*path, field), True, field, present)
 
 
 def with_present_names(data: dict[str, Any]) -> dict[str, Any]:
     """Return the plain data of a specification with present names."""
-    found: dict[str, Any] = reduce(changed, list(spec_changes(data)), data)
-    return found
+    renamed: dict[str, Any] = reduce(changed, list(spec_changes(data)), data)
+    return renamed
 
 
 def upgraded_toml(text: str, file: str = "<text>") -> tuple[str, list[Line]]:
@@ -74,12 +74,12 @@ def upgraded_toml(text: str, file: str = "<text>") -> tuple[str, list[Line]]:
             data = changed(data, change)
         except KeyError as error:
             raise InputError(f"{file}: expected one of {change.former} and {error.args[0]}, got both") from None
-        at, text = _edited(text, change, data, file)
-        lines.append(line_of(change, text.count("\n", 0, at) + 1))
+        offset, text = _edited(text, change, data, file)
+        lines.append(line_of(change, text.count("\n", 0, offset) + 1))
     return text, sorted(lines, key=lambda line: line.number)
 
 
-def _edited(text: str, change: Change, wanted: Any, file: str) -> tuple[int, str]:
+def _edited(text: str, change: Change, expected: Any, file: str) -> tuple[int, str]:
     """Return where one change was made in the text, and the text that has the wanted data.
 
     TOML's parser reports no places, so each place where the name occurs is tried.
@@ -89,11 +89,11 @@ def _edited(text: str, change: Change, wanted: Any, file: str) -> tuple[int, str
     present = change.present
     if isinstance(present, bool):
         written, present = rf"\"{name}\"|'{name}'", str(present).lower()
-    for found in re.finditer(written, text):
-        tried = text[: found.start()] + present + text[found.end() :]
+    for match in re.finditer(written, text):
+        candidate = text[: match.start()] + present + text[match.end() :]
         try:
-            if repr(tomllib.loads(tried)) == repr(wanted):
-                return found.start(), tried
+            if repr(tomllib.loads(candidate)) == repr(expected):
+                return match.start(), candidate
         except ValueError:
             continue
     raise InputError(f"{file}: expected former names without escapes; replace by hand: {change.former} by {present}")

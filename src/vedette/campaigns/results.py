@@ -125,8 +125,8 @@ class CampaignResults(SummaryRepr):
 
         runs: increasing numbers of the runs; None: all. Raises `InputError` for no run.
         """
-        wanted = self.finished(cell) if runs is None else tuple(map(operator.index, runs))
-        return read_ensemble(self, cell, wanted, 1 if self._own else self._num_workers)
+        selected = self.finished(cell) if runs is None else tuple(map(operator.index, runs))
+        return read_ensemble(self, cell, selected, 1 if self._own else self._num_workers)
 
     def summaries(self, cell: str, runs: Sequence[int]) -> Iterator[tuple[RunSummary, RunMetrics]]:
         """Yield summaries of these finished runs, with their metrics."""
@@ -158,8 +158,8 @@ class CampaignResults(SummaryRepr):
         Every part has only the columns of its own runs: `vedette.campaigns.tables.schema_of` returns all.
         """
         runs = self.runs()
-        while few := list(islice(runs, _TOGETHER)):
-            yield tables_of_runs(self.campaign, few)
+        while batch := list(islice(runs, _TOGETHER)):
+            yield tables_of_runs(self.campaign, batch)
 
     def dataset(self) -> xarray.Dataset:
         """Return the metrics at each scan as arrays over cell, run and step; see `vedette.campaigns.dataset`.
@@ -252,5 +252,5 @@ def open_results(
     manifest = read_manifest(target)
     reader = Reader(target)
     reader.check(contents_checksum(manifest))
-    known = campaign_of(target, manifest) if campaign is None else campaign.with_runs(manifest["num_runs"])
-    return CampaignResults(target, known, manifest, reader, tuple(metrics), num_workers)
+    resolved = campaign_of(target, manifest) if campaign is None else campaign.with_runs(manifest["num_runs"])
+    return CampaignResults(target, resolved, manifest, reader, tuple(metrics), num_workers)

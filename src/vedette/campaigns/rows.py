@@ -31,20 +31,20 @@ def pack(cell: str, run: int, content: bytes) -> Packed:
     return Packed(_ZSTD.compress(content, asbytes=True), _checksum(cell, run, content))
 
 
-def unpack(packed: bytes, most: int = MOST_BYTES) -> bytes:
+def unpack(packed: bytes, max_bytes: int = MOST_BYTES) -> bytes:
     """Return the content of bytes packed by zstd or, in older files, by zlib. Raises `ValueError` for others.
 
     A zstd frame states its unpacked size (RFC 8878, 3.1.1.1); larger ones are refused before memory is allocated.
     """
-    most = min(most, _SMALL + _MOST_TIMES * len(packed))
+    max_bytes = min(max_bytes, _SMALL + _MOST_TIMES * len(packed))
     if packed[: len(_MAGIC)] != _MAGIC:
-        return inflate(packed, most)
+        return inflate(packed, max_bytes)
     descriptor = int.from_bytes(packed[4:5], "little")
     flag, single = descriptor >> 6, descriptor >> 5 & 1
     field = packed[6 - single :][: (single, 2, 4, 8)[flag]]
     size = int.from_bytes(field, "little") + 256 * (flag == 1)
-    if size > most:
-        raise ValueError(f"it unpacks to more than {most} bytes")
+    if size > max_bytes:
+        raise ValueError(f"it unpacks to more than {max_bytes} bytes")
     try:
         content: bytes = _ZSTD.decompress(packed, decompressed_size=size, asbytes=True)
     except OSError as error:

@@ -152,13 +152,13 @@ def _check_undamaged(store: Store, redo: bool, progress: ProgressObserver) -> No
 
 def _add_missing_metrics(store: Store, campaign: Campaign, progress: ProgressObserver) -> None:
     """Compute metrics that the program or the scenarios have gained since runs were stored, from their records."""
-    own = {cell.name: custom_metrics(cell.scenario) for cell in campaign.cells}
-    lacking = store.unmeasured({cell: [metric.name for metric in of_cell] for cell, of_cell in own.items()})
+    metrics = {cell.name: custom_metrics(cell.scenario) for cell in campaign.cells}
+    lacking = store.unmeasured({cell: [metric.name for metric in of_cell] for cell, of_cell in metrics.items()})
     if lacking:
         results = open_results(store.folder, campaign=campaign)
         for cell, run in lacking:
-            there = results.run(cell, run)
-            store.put_metrics(cell, run, encode_metrics(there.metrics.with_custom(there.record, own[cell])))
+            stored = results.run(cell, run)
+            store.put_metrics(cell, run, encode_metrics(stored.metrics.with_custom(stored.record, metrics[cell])))
         progress.note(f"measured anew: {pluralise(len(lacking), 'run')}")
 
 

@@ -50,7 +50,7 @@ def score_strategies(group: GroupComparison) -> tuple[StrategyScore, ...]:
     comparison, scores = group.comparison, []
     for label, ensemble in zip(group.labels, comparison.ensembles, strict=True):
         total, decisions = comparison.summary(label), ensemble.seconds.get("planning", ())
-        known = TRACKED_OF_ALL in comparison.measures
+        has_tracked = TRACKED_OF_ALL in comparison.measures
         scores.append(
             StrategyScore(
                 label=label,
@@ -59,7 +59,7 @@ def score_strategies(group: GroupComparison) -> tuple[StrategyScore, ...]:
                 worst=float(comparison.run_means(label).max()),
                 difference=comparison.difference(label).summary if label != group.labels[0] else None,
                 cardinality_error=float(comparison.summary(label, "cardinality_error").mean),
-                tracked=float(comparison.summary(label, TRACKED_OF_ALL).mean) if known else None,
+                tracked=float(comparison.summary(label, TRACKED_OF_ALL).mean) if has_tracked else None,
                 decision_seconds=float(np.median(decisions)) if len(decisions) else None,
                 num_runs=comparison.num_runs,
             )

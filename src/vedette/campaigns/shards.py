@@ -35,8 +35,8 @@ class Shard:
 
     def __post_init__(self) -> None:
         if not 1 <= self.number <= self.count <= _MOST_SHARDS:
-            wanted = f"a number from 1 to the number of shards (at most {_MOST_SHARDS})"
-            raise InputError(f"shard: expected {wanted}; got {self}")
+            expected = f"a number from 1 to the number of shards (at most {_MOST_SHARDS})"
+            raise InputError(f"shard: expected {expected}; got {self}")
 
     def __str__(self) -> str:
         return f"{self.number}/{self.count}"
@@ -54,11 +54,11 @@ class Shard:
         shared = math.gcd(num_cells, self.count)
         length = self.count // shared  # length of a round in runs
         inverse = pow(num_cells // shared, -1, length)
-        found = []
+        numbers = []
         for number in range((self.number - 1 - cell) % shared, -(-num_runs // length), shared):
             turn = (self.number - 1 - number) % self.count
-            found.append(number * length + (turn - cell) // shared * inverse % length)
-        return found if not found or found[-1] < num_runs else found[:-1]
+            numbers.append(number * length + (turn - cell) // shared * inverse % length)
+        return numbers if not numbers or numbers[-1] < num_runs else numbers[:-1]
 
 
 WHOLE = Shard()
@@ -76,10 +76,10 @@ def owner(run: _Runs, cell: int, num_cells: int, count: int) -> _Runs:
 
 def parse_shard(text: str) -> Shard:
     """Return the shard written as `17/1000`. Raises `InputError` for other texts."""
-    found = re.fullmatch(r"([0-9]{1,9})/([0-9]{1,9})", text.strip(), re.ASCII)
-    if found is None:
+    match = re.fullmatch(r"([0-9]{1,9})/([0-9]{1,9})", text.strip(), re.ASCII)
+    if match is None:
         raise InputError(f"shard: expected NUMBER/COUNT, such as 17/1000; got {shown(text)}")
-    return Shard(int(found[1]), int(found[2]))
+    return Shard(int(match[1]), int(match[2]))
 
 
 def ranges(numbers: Collection[int]) -> str:
@@ -95,8 +95,8 @@ def ranges(numbers: Collection[int]) -> str:
 
 def _minutes(text: str) -> int:
     """Return the minutes of a time such as `4h`, `90m` or `1d12h`. Raises `InputError` for other texts or zero."""
-    found = re.fullmatch(r"(?:([0-9]{1,4})d)?(?:([0-9]{1,4})h)?(?:([0-9]{1,6})m)?", text.strip(), re.ASCII)
-    days, hours, minutes = (int(part or 0) for part in found.groups()) if found else (0, 0, 0)
+    match = re.fullmatch(r"(?:([0-9]{1,4})d)?(?:([0-9]{1,4})h)?(?:([0-9]{1,6})m)?", text.strip(), re.ASCII)
+    days, hours, minutes = (int(part or 0) for part in match.groups()) if match else (0, 0, 0)
     if not days + hours + minutes:
         raise InputError(f"time: expected days, hours or minutes, such as 4h or 1d12h; got {shown(text)}")
     return minutes + 60 * (hours + 24 * days)

@@ -80,8 +80,8 @@ class CampaignSpec(Section):
         places += [(("variants", i, "name"), variant.name) for i, variant in enumerate(self.variants)]
         for place, name in places:
             if name.startswith(("-", ".")):
-                wanted = "a name that begins with neither a dash nor a dot, as files and folders are named after it"
-                yield place, wanted, describe(name)
+                expected = "a name that begins with neither a dash nor a dot, as files and folders are named after it"
+                yield place, expected, describe(name)
             elif name.partition(".")[0].strip().lower() in _DEVICES:
                 yield (
                     place,

@@ -93,11 +93,9 @@ class Store(Writer):
                 raise InputError(f"run: expected a number from 0 to {self._num_runs[row.cell] - 1}; got {row.run}")
         self.put(runs, self.session)
 
-    def unmeasured(self, own: Mapping[str, Collection[str]]) -> tuple[tuple[str, int], ...]:
-        """Return cell name and number of finished runs that lack metrics of this version, or `own` metrics of their
-        cell.
-        """
-        return tuple((cell, run) for cell, run, kept in self.metrics() if not has_metrics(kept, own.get(cell, ())))
+    def unmeasured(self, names: Mapping[str, Collection[str]]) -> tuple[tuple[str, int], ...]:
+        """Return cell and number of finished runs that lack metrics of this version, or those of `names` by cell."""
+        return tuple((cell, run) for cell, run, kept in self.metrics() if not has_metrics(kept, names.get(cell, ())))
 
     def note_failure(self, cell: str, run: int, message: str) -> None:
         """Store why a run could not be finished, until it is finished."""

@@ -74,10 +74,10 @@ def tables_of_runs(campaign: Campaign, runs: Iterable[FinishedRun]) -> dict[str,
     kinds = {key: Kind.TEXT if isinstance(value, str) else Kind.NUMBER for key, value in keys.items()} if parts else {}
     metadata = {"vedette": json.dumps({"campaign": campaign.name, "seed": campaign.seed})}
     tables = {}
-    for name, of in parts.items():
+    for name, table_parts in parts.items():
         layout = Layout({**kinds, **_layout(name).fixed}, _layout(name).more)
-        names = list(dict.fromkeys(name for part in of for name in part))
-        tables[name] = _arrow(stacked(of, layout, names), layout).replace_schema_metadata(metadata)
+        names = list(dict.fromkeys(name for part in table_parts for name in part))
+        tables[name] = _arrow(stacked(table_parts, layout, names), layout).replace_schema_metadata(metadata)
     return tables
 
 
@@ -93,11 +93,11 @@ def in_schema(table: pa.Table, schema: pa.Schema) -> pa.Table:
 
 def concatenated_tables(parts: Iterable[dict[str, pa.Table]]) -> dict[str, pa.Table]:
     """Concatenate the tables of several sets of runs."""
-    found: dict[str, list[pa.Table]] = {}
+    tables_by_name: dict[str, list[pa.Table]] = {}
     for part in parts:
         for name, table in part.items():
-            found.setdefault(name, []).append(table)
-    return {name: pa.concat_tables(of, promote_options="permissive") for name, of in found.items()}
+            tables_by_name.setdefault(name, []).append(table)
+    return {name: pa.concat_tables(tables, promote_options="permissive") for name, tables in tables_by_name.items()}
 
 
 def _columns(record: RunRecord) -> dict[str, Columns]:

@@ -176,9 +176,9 @@ class TaskQueue:
         """Return a task of some runs of the cell at that place."""
         cell, runs = self._cells[place], self._todo[place]
         seconds = self._fastest.get(cell.name, MIN_TASK_SECONDS)
-        wanted = math.ceil(max(MIN_TASK_SECONDS, room * _HANDED_OUT_SECONDS) / seconds)
+        num_runs = math.ceil(max(MIN_TASK_SECONDS, room * _HANDED_OUT_SECONDS) / seconds)
         share = -(-self._num_left // room)
-        taken = tuple(runs.popleft() for _ in range(min(max(1, min(wanted, share)), len(runs))))
+        taken = tuple(runs.popleft() for _ in range(min(max(1, min(num_runs, share)), len(runs))))
         self._num_left -= len(taken)
         self._put_back(place)
         return Task(cell, self._seed, taken, self._versions)

@@ -40,13 +40,13 @@ def upgrade_results(directory: Path | str) -> int:
     number: int = manifest["format_version"]
     if number == FORMAT_VERSION:
         return number
-    fresh = {**_upgraded_manifest(folder, manifest), "format_version": FORMAT_VERSION, "upgraded_from": number}
+    upgraded = {**_upgraded_manifest(folder, manifest), "format_version": FORMAT_VERSION, "upgraded_from": number}
     writer = journal.Writer(folder)
     try:
-        contents = contents_checksum(fresh)
+        contents = contents_checksum(upgraded)
         writer.open_runs(contents_checksum(manifest), contents)
         writer.rewrite(lambda entry: codec.upgraded(entry.payload, number, STRATEGIES), contents)
-        write_manifest(folder, fresh)
+        write_manifest(folder, upgraded)
     finally:
         writer.close()
     return number
@@ -55,8 +55,8 @@ def upgrade_results(directory: Path | str) -> int:
 def _upgraded_scenario(text: str) -> str:
     """Return the text of a stored scenario with present names; unchanged if it has no other."""
     data = read_yaml(text, "scenario").data
-    found = list(changes(data))
-    return dump_data(reduce(changed, found, data)) if found else text
+    scenario_changes = list(changes(data))
+    return dump_data(reduce(changed, scenario_changes, data)) if scenario_changes else text
 
 
 def _upgraded_manifest(folder: Path, manifest: Mapping[str, Any]) -> dict[str, Any]:
@@ -64,13 +64,13 @@ def _upgraded_manifest(folder: Path, manifest: Mapping[str, Any]) -> dict[str, A
     spec = with_present_names(manifest["spec"])
     specification = spec_from_data({**spec, "runs": manifest["num_runs"]}, "spec")
     cells = [
-        {**cell, "planner": own["planner"], "settings": own, "scenario": _upgraded_scenario(cell["scenario"])}
-        for cell, own in zip(manifest["cells"], specification.settings(), strict=True)
+        {**cell, "planner": settings["planner"], "settings": settings, "scenario": _upgraded_scenario(cell["scenario"])}
+        for cell, settings in zip(manifest["cells"], specification.settings(), strict=True)
     ]
     compare = present_field(manifest["compare"])
     plain = json.loads(json.dumps({"spec": spec, "axes": specification.axes(), "compare": compare, "cells": cells}))
-    fresh = {**manifest, **plain}
-    return {**fresh, "digest": _upgraded_digest(folder, manifest, fresh)}
+    upgraded = {**manifest, **plain}
+    return {**upgraded, "digest": _upgraded_digest(folder, manifest, upgraded)}
 
 
 def _upgraded_digest(folder: Path, before: Mapping[str, Any], after: Mapping[str, Any]) -> str:
@@ -80,14 +80,14 @@ def _upgraded_digest(folder: Path, before: Mapping[str, Any], after: Mapping[str
         contents = [contents_of(cell.scenario) for cell in campaign_of(folder, after).cells]
     except OSError:
         return digest
-    found = [
+    digests = [
         digest_of(
             manifest["seed"],
             [
-                (cell["name"], cell["planner"], cell["scenario"], own)
-                for cell, own in zip(manifest["cells"], contents, strict=True)
+                (cell["name"], cell["planner"], cell["scenario"], settings)
+                for cell, settings in zip(manifest["cells"], contents, strict=True)
             ],
         )
         for manifest in (before, after)
     ]
-    return found[1] if found[0] == digest else digest
+    return digests[1] if digests[0] == digest else digest

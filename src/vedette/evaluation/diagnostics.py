@@ -125,12 +125,12 @@ def _filter_diagnostics(health: HealthSummary) -> Iterator[Diagnostic]:
         _level(health.inexact),
     )
     worst, mean = health.worst_factoring / 2.0, health.mean_factoring / 2.0
-    known = not math.isnan(worst)
+    is_known = not math.isnan(worst)
     yield Diagnostic(
         "Independence error",
         "Upper bound on the share of the weight that a filter moves when it treats labels as independent, per scan.",
-        (f"{_bound(worst)} (mean {_bound(mean)})" if worst else "none") if known else "not known",
-        ("check" if mean > 5.0 * _CHECK_ABOVE else _level(worst, math.inf)) if known else "note",
+        (f"{_bound(worst)} (mean {_bound(mean)})" if worst else "none") if is_known else "not known",
+        ("check" if mean > 5.0 * _CHECK_ABOVE else _level(worst, math.inf)) if is_known else "note",
     )
     yield Diagnostic(
         "Targets dropped",

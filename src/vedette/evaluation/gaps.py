@@ -158,8 +158,8 @@ def _estimate_information(
     """Yield the information in the scans of each of the first estimates; prior: of births, before the first."""
     scans = (history.steps[:_FIRST_ESTIMATES] - 1).tolist()
     fits = prior.log_weights + _log_densities(prior, history.means[0], history.covs[0])
-    before = taken_components(prior, np.array([int(np.argmax(fits))]))
-    yield _information(scans[0], before, history.means[0], history.covs[0])
+    nearest = taken_components(prior, np.array([int(np.argmax(fits))]))
+    yield _information(scans[0], nearest, history.means[0], history.covs[0])
     for k, (last, now) in enumerate(pairwise(scans)):
         posterior = components_of(np.zeros(1), history.means[k : k + 1].copy(), history.covs[k : k + 1].copy())
         yield _information(now, observations.predict(posterior, last, now), history.means[k + 1], history.covs[k + 1])
@@ -172,16 +172,16 @@ def _log_densities(mixture: Mixture, mean: Floats, cov: Floats) -> Floats:
     return np.asarray(-0.5 * (squared + np.linalg.slogdet(covariances)[1]))
 
 
-def _information(scan: int, before: Mixture, mean: Floats, cov: Floats) -> _Information:
+def _information(scan: int, prior: Mixture, mean: Floats, cov: Floats) -> _Information:
     """Return the quotient of N(mean, cov) and the Gaussian before the scan, in the directions in which that is wider.
 
     With cov = R R' and the eigenvectors of 1 - R' P^-1 R, P the covariance before, the information of the scan in each
     direction is the eigenvalue, from 0 (none) to 1 (all that is known).
     """
-    root, precision = np.linalg.cholesky(cov), np.linalg.inv(before.covs[0])
+    root, precision = np.linalg.cholesky(cov), np.linalg.inv(prior.covs[0])
     values, axes = np.linalg.eigh(np.eye(len(mean)) - root.T @ precision @ root)
     is_informative = values > _LEAST_INFORMATION
-    whitened = axes.T @ root.T @ precision @ (mean - before.means[0])
+    whitened = axes.T @ root.T @ precision @ (mean - prior.means[0])
     back = axes.T @ np.linalg.inv(root)
     return _Information(scan, mean, back.T @ (is_informative * whitened), (back.T * (is_informative * values)) @ back)
 

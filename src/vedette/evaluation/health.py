@@ -50,8 +50,8 @@ def health_sums(healths: Sequence[Health]) -> HealthSums:
         return np.concatenate([getattr(health, name) for health in healths])
 
     def scans(name: str) -> int:
-        happened = concatenated(name) > 0
-        return int(happened.reshape(len(happened), -1).any(axis=1).sum())
+        positive = concatenated(name) > 0
+        return int(positive.reshape(len(positive), -1).any(axis=1).sum())
 
     discarded, factoring = concatenated("truncation_error_bound"), concatenated("independence_error_bound")
     lacking = concatenated("num_missing_labels") > 0
@@ -139,16 +139,16 @@ def summarise_health(sums: HealthSums, sensors: Sequence[str] = ()) -> HealthSum
     def mean(total: float, number: int) -> float:
         return total / number if number else np.nan
 
-    num_scans, known, factored = sums.num_scans, sums.num_discarded, sums.num_factoring
+    num_scans, num_known, num_factored = sums.num_scans, sums.num_discarded, sums.num_factoring
     return HealthSummary(
         num_scans=num_scans,
         limit_reached=sums.limit_reached / num_scans,
         search_truncated=sums.search_truncated / num_scans,
         inexact=sums.inexact / num_scans,
-        mean_discarded=mean(sums.discarded, known),
-        worst_discarded=sums.worst_discarded if known else np.nan,
-        mean_factoring=mean(sums.factoring, factored),
-        worst_factoring=sums.worst_factoring if factored else np.nan,
+        mean_discarded=mean(sums.discarded, num_known),
+        worst_discarded=sums.worst_discarded if num_known else np.nan,
+        mean_factoring=mean(sums.factoring, num_factored),
+        worst_factoring=sums.worst_factoring if num_factored else np.nan,
         worst_dropped=sums.worst_dropped,
         duplicates=sums.duplicates,
         clutter_raised=sums.clutter_raised,

@@ -119,10 +119,10 @@ def birth_intensity(belief: FactoredGLMB, history: TrackHistory, observations: O
     if undetected.cells is not None and birth.from_measurements is not None:
         grid, in_plane = undetected.cells.grid, np.arange(birth.state_dim) < 2
         std = birth.from_measurements.std * np.where(in_plane, WIDE, 1.0)
-        place = history.means[:1] * in_plane
-        nearest = np.argmin(((grid.centres - place[0, :2]) ** 2).sum(axis=1))  # also of a place outside the region
+        state = history.means[:1] * in_plane
+        nearest = np.argmin(((grid.centres - state[0, :2]) ** 2).sum(axis=1))  # also of a state outside the region
         density = undetected.cells.expected[nearest] / np.prod(grid.cell_size)
         with np.errstate(divide="ignore"):
             weight = np.log(density * 2.0 * np.pi * std[0] * std[1])
-        parts.append(components_of(np.array([weight]), place, np.diag(std**2)[np.newaxis]))
+        parts.append(components_of(np.array([weight]), state, np.diag(std**2)[np.newaxis]))
     return joined_components(parts)

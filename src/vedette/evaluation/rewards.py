@@ -60,18 +60,18 @@ class RewardSums(NamedTuple):
     @classmethod
     def from_decisions(cls, decision: int, decisions: Sequence[Decision]) -> RewardSums:
         """Return the sums of runs that made the decision of that index."""
-        first, tables = decisions[0], [each.plan.tables for each in decisions]
+        first, tables = decisions[0], [decision.plan.tables for decision in decisions]
         shapes = [tuple(table.mean.shape for table in run_tables) for run_tables in tables]
         faults = []
         if not all(tables):
             faults.append(f"records: expected runs with rewards at decision {decision}; got none")
         elif len(set(shapes)) > 1:
             faults.append("records: expected tables of one shape; got several")
-        summed = [] if faults else [_summed(place, decisions) for place in range(len(tables[0]))]
+        summed = [] if faults else [_summed(index, decisions) for index in range(len(tables[0]))]
         counts, means, squares, chosen = zip(*summed, strict=True) if summed else ((), (), (), ())
-        is_absolute = _have_equal_actions([each.plan.actions for each in decisions])
+        is_absolute = _have_equal_actions([decision.plan.actions for decision in decisions])
         is_relative = (
-            _have_equal_actions([_turn_actions(each) for each in decisions])
+            _have_equal_actions([_turn_actions(decision) for decision in decisions])
             if not is_absolute
             else _have_equal_headings(decisions)
         )
@@ -145,16 +145,16 @@ def mean_rewards(records: Sequence[RunRecord], decision: int) -> MeanRewards:
     return RewardSums.from_decisions(decision, decisions).mean()
 
 
-def _summed(place: int, decisions: Sequence[Decision]) -> tuple[Floats, Floats, Floats, Floats]:
+def _summed(table_index: int, decisions: Sequence[Decision]) -> tuple[Floats, Floats, Floats, Floats]:
     """Return for one table the number of runs with each entry, mean and squares about it, and number that chose it."""
-    values = np.array([each.plan.tables[place].mean for each in decisions])
-    known = np.isfinite(values)
-    count = known.sum(axis=0).astype(np.float64)
-    mean = np.where(known, values, 0.0).sum(axis=0) / np.maximum(count, 1.0)
-    squares = np.where(known, (values - mean) ** 2, 0.0).sum(axis=0)
+    values = np.array([decision.plan.tables[table_index].mean for decision in decisions])
+    finite = np.isfinite(values)
+    count = finite.sum(axis=0).astype(np.float64)
+    mean = np.where(finite, values, 0.0).sum(axis=0) / np.maximum(count, 1.0)
+    squares = np.where(finite, (values - mean) ** 2, 0.0).sum(axis=0)
     chosen = np.zeros(values.shape[1:])
-    for each in decisions:
-        chosen[tuple(each.plan.chosen[sensor] for sensor in each.plan.tables[place].sensors)] += 1.0
+    for decision in decisions:
+        chosen[tuple(decision.plan.chosen[sensor] for sensor in decision.plan.tables[table_index].sensors)] += 1.0
     return count, mean, squares, chosen
 
 
@@ -185,16 +185,16 @@ def _have_equal_headings(decisions: Sequence[Decision]) -> bool:
 def _have_equal_actions(actions: Sequence[tuple[Actions, ...]]) -> bool:
     """Return True if all runs had the same actions, up to rounding and full turns."""
     return all(
-        own.columns == first.columns
-        and len(own) == len(first)
-        and (np.array_equal(own.values, first.values) or _largest_difference(own, first) < _TOLERANCE)
+        other.columns == first.columns
+        and len(other) == len(first)
+        and (np.array_equal(other.values, first.values) or _largest_difference(other, first) < _TOLERANCE)
         for run in actions
-        for own, first in zip(run, actions[0], strict=True)
+        for other, first in zip(run, actions[0], strict=True)
     )
 
 
-def _largest_difference(own: Actions, first: Actions) -> float:
-    differences = np.abs(own.values - first.values)
-    angles = [name.endswith("_deg") for name in own.columns]
+def _largest_difference(other: Actions, first: Actions) -> float:
+    differences = np.abs(other.values - first.values)
+    angles = [name.endswith("_deg") for name in other.columns]
     differences[:, angles] = np.abs(np.remainder(differences[:, angles] + 180.0, 360.0) - 180.0)
     return float(differences.max(initial=0.0))

@@ -140,8 +140,8 @@ def scan_table(record: RunRecord, scenario: Scenario) -> dict[str, list[Any]]:
             beam_lags = lags(bearings, pose).tolist() if is_turn(pose) and len(bearings) else [0.0] * len(rows)
             more = [dict[str, Any]() for _ in rows] if recording is None else _accuracy_cells(recording, k, s, columns)
             for row, lag, own_accuracy in zip(rows, beam_lags, more or [{}], strict=True):
-                place = pose[:2] + lag * pose[OWN_VELOCITY:BEAM] if lag else pose[:2]
-                pose_cells = zip(pose_columns, (*place, heading, *pose[OWN_VELOCITY:]), strict=False)
+                position = pose[:2] + lag * pose[OWN_VELOCITY:BEAM] if lag else pose[:2]
+                pose_cells = zip(pose_columns, (*position, heading, *pose[OWN_VELOCITY:]), strict=False)
                 cells = {
                     "time": time + lag,
                     "sensor": site.name,
@@ -165,12 +165,12 @@ def _accuracy_cells(recording: RecordedScans, k: int, s: int, columns: Sequence[
     scan, accuracy, dim = recording.scans[k][s], recording.accuracy[k][s], len(columns)
     assert scan is not None
     variances = np.diagonal(noise_of_rows(scan, np.zeros((len(scan), dim, dim))), axis1=1, axis2=2)
-    found = [{columns[i]: None for i in np.flatnonzero(own >= MISSING).tolist()} for own in variances]
+    all_cells = [{columns[i]: None for i in np.flatnonzero(row >= MISSING).tolist()} for row in variances]
     if accuracy is not None:
         names = [_accuracy_column(name) for name in recording.accuracy_columns[s]]
-        for cells, values in zip(found, accuracy.tolist(), strict=True):
+        for cells, values in zip(all_cells, accuracy.tolist(), strict=True):
             cells |= {name: None if isnan(value) else value for name, value in zip(names, values, strict=True)}
-    return found
+    return all_cells
 
 
 def plane_coordinates(measurements: Floats, kind: str, pose: Floats) -> Floats:

@@ -38,8 +38,8 @@ class _Track(NamedTuple):
     detections: tuple[list[bool], ...]
 
     def is_measured_by(self, sensor: int) -> bool:
-        own = self.detections[sensor]
-        return sum(own) >= max(_MIN_SCANS, _MIN_SHARE * len(own))
+        detections = self.detections[sensor]
+        return sum(detections) >= max(_MIN_SCANS, _MIN_SHARE * len(detections))
 
 
 def disagreement_warnings(record: RunRecord, scenario: Scenario) -> tuple[str, ...]:
@@ -133,28 +133,28 @@ def _in_view(sensor: Sensor, pose: Floats, mean: Floats) -> bool:
 
 
 def _parallel_tracks(
-    tracks: Mapping[Label, _Track], pair: tuple[int, int], names: tuple[str, str], places: Floats
+    tracks: Mapping[Label, _Track], pair: tuple[int, int], names: tuple[str, str], sensor_positions: Floats
 ) -> Iterator[str]:
     """Yield a warning if tracks of one sensor keep a small offset from tracks of the other, as two of one target do.
 
-    places: (2, 2) positions of the two sensors, m.
+    sensor_positions: (2, 2), m.
     """
     first, second = (
         [track for track in tracks.values() if track.is_measured_by(one) and not track.is_measured_by(other)]
         for one, other in (pair, pair[::-1])
     )
-    offsets = [offset for one in first if (offset := _nearest_offset(one, second, places)) is not None]
+    offsets = [offset for track in first if (offset := _nearest_offset(track, second, sensor_positions)) is not None]
     if offsets:
         distance = f"{np.median(offsets):.0f} m from one of {names[1]}"
         finding = f"{len(offsets)} of {len(first)} tracks of {names[0]} keep {distance}, as two tracks of one target do"
         yield f"{finding}: `vedette calibrate` finds biases of range, bearing, clock and place"
 
 
-def _nearest_offset(track: _Track, others: list[_Track], places: Floats) -> float | None:
+def _nearest_offset(track: _Track, others: list[_Track], sensor_positions: Floats) -> float | None:
     """Return the distance to the nearest other track with a constant offset, m; None if there is none near enough."""
     nearest: float | None = None
     mean = np.mean(list(track.means.values()), axis=0)
-    largest = _MAX_OFFSET_SHARE * float(np.hypot(*(mean - places).T).min())
+    largest = _MAX_OFFSET_SHARE * float(np.hypot(*(mean - sensor_positions).T).min())
     for other in others:
         common = sorted(track.means.keys() & other.means.keys())
         if len(common) < _MIN_ESTIMATES:

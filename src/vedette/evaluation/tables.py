@@ -76,7 +76,7 @@ def strategy_latex(comparison: Comparison) -> str:
 
 def _latex(text: str) -> str:
     """Return text for LaTeX: special characters escaped, signed numbers and signs of arithmetic in mathematics."""
-    return _NUMBER.sub(lambda found: f"${found[0]}$", text.translate(_ESCAPED)).replace("±", "$\\pm$")
+    return _NUMBER.sub(lambda match: f"${match[0]}$", text.translate(_ESCAPED)).replace("±", "$\\pm$")
 
 
 def significance(comparison: Comparison) -> str:

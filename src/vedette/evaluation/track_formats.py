@@ -42,12 +42,12 @@ def geojson(table: Table) -> bytes:
     """
     features = []
     for track, rows in _tracks("GeoJSON", table).items():
-        places = [[table["lon_deg"][row], table["lat_deg"][row]] for row in rows]
-        places = [[round(degrees, _DIGITS) for degrees in place] for place in places]
+        points = [[table["lon_deg"][row], table["lat_deg"][row]] for row in rows]
+        points = [[round(degrees, _DIGITS) for degrees in point] for point in points]
         if "z_m" in table:
-            places = [[*place, round(table["z_m"][row], 1)] for place, row in zip(places, rows, strict=True)]
-        line = {"type": "LineString", "coordinates": places}
-        geometry = line if len(places) > 1 else {"type": "Point", "coordinates": places[0]}
+            points = [[*point, round(table["z_m"][row], 1)] for point, row in zip(points, rows, strict=True)]
+        line = {"type": "LineString", "coordinates": points}
+        geometry = line if len(points) > 1 else {"type": "Point", "coordinates": points[0]}
         properties: dict[str, Any] = {"label": track, "target": _most_common([table["target"][row] for row in rows])}
         properties["labels"] = list(dict.fromkeys(table["label"][row] for row in rows))
         for name in ("time_s", "utc", "existence"):
@@ -65,17 +65,17 @@ def czml(table: Table) -> bytes:
     packets: list[dict[str, Any]] = []
     for label, rows in _tracks("CZML", table).items():
         times = [table["time_s"][row] for row in rows]
-        places: list[float] = []
+        coordinates: list[float] = []
         for row, time in zip(rows, times, strict=True):
             degrees = [round(table[name][row], _DIGITS) for name in ("lon_deg", "lat_deg")]
-            places += [round(time - times[0], 6), *degrees, round(table["z_m"][row], 1) if "z_m" in table else 0.0]
+            coordinates += [round(time - times[0], 6), *degrees, round(table["z_m"][row], 1) if "z_m" in table else 0.0]
         name = _most_common([table["target"][row] for row in rows]) or label
         packets.append(
             {
                 "id": label,
                 "name": name,
                 "availability": f"{utc_text(times[0])}/{utc_text(times[-1])}",
-                "position": {"epoch": utc_text(times[0]), "cartographicDegrees": places},
+                "position": {"epoch": utc_text(times[0]), "cartographicDegrees": coordinates},
                 "point": {"pixelSize": 8},
                 "path": {"width": 2},
                 "label": {"text": name, "font": "12px sans-serif", "pixelOffset": {"cartesian2": [0, -16]}},

@@ -74,8 +74,8 @@ def track_table(
     means, covs = (np.array([row[part] for row in rows]) for part in (2, 3))
     table |= state_columns(means.reshape(-1, dim), covs.reshape(-1, dim, dim), has_height=has_height)
     if origin is not None:
-        places = origin.to_degrees(np.array([row[2][:2] for row in rows]).reshape(-1, 2))
-        table["lon_deg"], table["lat_deg"] = places[:, 0].tolist(), places[:, 1].tolist()
+        positions = origin.to_degrees(np.array([row[2][:2] for row in rows]).reshape(-1, 2))
+        table["lon_deg"], table["lat_deg"] = positions[:, 0].tolist(), positions[:, 1].tolist()
     if compass is not None and dim >= 4:
         courses = courses_of(compass, means.reshape(-1, dim))
         table["course_deg"], table["speed_mps"] = courses[:, 0].tolist(), courses[:, 1].tolist()

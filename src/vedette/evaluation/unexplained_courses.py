@@ -67,11 +67,11 @@ def unexplained_course_warnings(record: RunRecord, scenario: Scenario) -> tuple[
     return tuple(warnings)
 
 
-def _warning(courses: list[_Course], name: str, place: Floats, assumed: float) -> str:
-    speeds, first = [each.speed for each in courses], min(courses, key=lambda each: each.begin)
-    distance = float(np.hypot(*(first.first - place)))
-    span = f"from {first.begin:g} to {max(each.end for each in courses):g} s, the first {distance:.0f} m away"
-    count = pluralise(sum(each.number for each in courses), "measurement")
+def _warning(courses: list[_Course], name: str, sensor_position: Floats, assumed: float) -> str:
+    speeds, first = [course.speed for course in courses], min(courses, key=lambda course: course.begin)
+    distance = float(np.hypot(*(first.first - sensor_position)))
+    span = f"from {first.begin:g} to {max(course.end for course in courses):g} s, the first {distance:.0f} m away"
+    count = pluralise(sum(course.number for course in courses), "measurement")
     speed_range = f"{min(speeds):.0f} to {max(speeds):.0f} m/s"
     step = 10.0 ** math.floor(math.log10(max(speeds)))
     advice = f"`--max-target-speed {0.5 * step * math.ceil(2.2 * max(speeds) / step):g}`, or `birth` and `motion`"
@@ -127,21 +127,21 @@ def _courses(scans: list[_UnexplainedScan], slowest: float, area: float) -> list
 def _longest(scans: list[_UnexplainedScan], free: list[Bools], slowest: float) -> list[tuple[int, int]]:
     """Return the longest course of free measurements as pairs (scan, measurement)."""
     best: list[tuple[int, int]] = []
-    courses: dict[tuple[int, int], list[tuple[int, int]]] = {}  # by the last two measurements, of the scan before
+    courses: dict[tuple[int, int], list[tuple[int, int]]] = {}  # by the last two measurements, of the scan previous
     for k in range(1, len(scans)):
-        now, before, step = scans[k], scans[k - 1], scans[k].time - scans[k - 1].time
+        current, previous, step = scans[k], scans[k - 1], scans[k].time - scans[k - 1].time
         continued: dict[tuple[int, int], list[tuple[int, int]]] = {}
-        if step > 0.0 and len(now.places) and len(before.places):
-            moves = now.places[None] - before.places[:, None]
+        if step > 0.0 and len(current.places) and len(previous.places):
+            moves = current.places[None] - previous.places[:, None]
             speeds = np.hypot(moves[..., 0], moves[..., 1]) / step
             usable = (speeds >= slowest) & (speeds <= _MAX_SPEED) & free[k - 1][:, None] & free[k][None]
             for i, j in zip(*(each.tolist() for each in np.nonzero(usable)), strict=True):
                 continued[i, j] = [(k - 1, i), (k, j)]
             for (h, i), course in courses.items():
-                ratio = step / (before.time - scans[k - 2].time)
-                predicted = before.places[i] + ratio * (before.places[i] - scans[k - 2].places[h])
-                distances = np.hypot(*(now.places - predicted).T)
-                gates = _GATE * now.stds * math.sqrt(1.0 + (1.0 + ratio) ** 2 + ratio**2)
+                ratio = step / (previous.time - scans[k - 2].time)
+                predicted = previous.places[i] + ratio * (previous.places[i] - scans[k - 2].places[h])
+                distances = np.hypot(*(current.places - predicted).T)
+                gates = _GATE * current.stds * math.sqrt(1.0 + (1.0 + ratio) ** 2 + ratio**2)
                 for j in np.flatnonzero((distances <= gates) & usable[i]).tolist():
                     if len(course) >= len(continued[i, j]):
                         continued[i, j] = [*course, (k, j)]

@@ -19,7 +19,7 @@ def write_benchmark(tables: Sequence[SceneTable], facts: Mapping[str, str], path
     """
     prepare_folder(path)
     named = [
-        (table, Table(_NOTE, header(table), tuple(row(table, own) for own in table.standings))) for table in tables
+        (table, Table(_NOTE, header(table), tuple(row(table, each) for each in table.standings))) for table in tables
     ]
     of_what = Table(
         "Versions, and SHA-256 of scenes and entrants.", ("What", "Value"), tuple(facts.items()), is_words=True

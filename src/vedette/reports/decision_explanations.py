@@ -66,8 +66,8 @@ def _margin(runner_up: RunnerUp, reward: float) -> str:
 
 def _others(plan: Plan, runner_up: RunnerUp, names: Sequence[str]) -> str:
     words = (
-        f"{names[s]} to {describe_action(rounded(own.columns, own.values[other]))}"
-        for s, (own, chosen, other) in enumerate(zip(plan.actions, plan.chosen, runner_up.actions, strict=True))
+        f"{names[s]} to {describe_action(rounded(actions.columns, actions.values[other]))}"
+        for s, (actions, chosen, other) in enumerate(zip(plan.actions, plan.chosen, runner_up.actions, strict=True))
         if other != chosen
     )
     return ", ".join(words)
@@ -78,8 +78,8 @@ def _targets(gains: TargetGains) -> dict[str, Any]:
     largest, rest = order[:_MOST_TARGETS].tolist(), order[_MOST_TARGETS:].tolist()
     least = _SAME * float(np.abs(gains.total).max(initial=0.0))  # smaller gains are rounding
 
-    def gained(which: list[int]) -> tuple[float, float]:
-        existence, localisation = float(gains.existence[which].sum()), float(gains.localisation[which].sum())
+    def gained(indices: list[int]) -> tuple[float, float]:
+        existence, localisation = float(gains.existence[indices].sum()), float(gains.localisation[indices].sum())
         return _number(existence, least), _number(localisation, least)
 
     shown = [(".".join(map(str, gains.labels[i].tolist())), *gained([i])) for i in largest]
@@ -90,8 +90,8 @@ def _sensors(plan: Plan, explanation: Explanation) -> list[tuple[int, str, float
     if explanation.of_sensors is None or explanation.reward_without_sensor is None:
         return []
     return [
-        (s, describe_action(rounded(own.columns, own.values[chosen])), _number(share), _number(without))
-        for s, (own, chosen, share, without) in enumerate(
+        (s, describe_action(rounded(actions.columns, actions.values[chosen])), _number(share), _number(without))
+        for s, (actions, chosen, share, without) in enumerate(
             zip(
                 plan.actions,
                 plan.chosen,

@@ -64,13 +64,13 @@ def group_drawings(group: Group) -> Iterator[Drawing]:
     yield from _tracks_drawings(group)
     if any(each.ensemble.measures for each in group.strategies):
         yield from _consistency_drawings(group.strategies)
-    spent = {each.label: stage_seconds(each) for each in group.strategies}
-    if any(spent.values()):
+    costs = {strategy.label: stage_seconds(strategy) for strategy in group.strategies}
+    if any(costs.values()):
         caption = (
             "Wall time of each stage, a scan or a decision: median, and the range from the 5th to the 95th percentile "
             f"where there are at least {MIN_FOR_TAILS} values."
         )
-        yield Drawing("cost", "Cost", caption, cost_figure({name: stages for name, stages in spent.items() if stages}))
+        yield Drawing("cost", "Cost", caption, cost_figure({name: stages for name, stages in costs.items() if stages}))
 
 
 def _tracks_drawings(group: Group) -> Iterator[Drawing]:
@@ -160,7 +160,7 @@ def _rewards(strategy: Strategy) -> Figure | None:
     """
     try:
         decisions = shown_decisions(len(strategy.ensemble.rewards))
-        return mean_rewards_figure([strategy.ensemble.rewards[each].mean() for each in decisions], strategy.scene)
+        return mean_rewards_figure([strategy.ensemble.rewards[index].mean() for index in decisions], strategy.scene)
     except InputError:
         return None
 
@@ -169,8 +169,8 @@ def typical_records(group: Group) -> tuple[tuple[Strategy, RunRecord], ...]:
     """Return for each strategy the run with the median of the mean OSPA; without a comparison its first run."""
     typical = []
     for strategy in group.strategies:
-        place = 0 if group.comparison is None else typical_run(group.comparison, strategy.label)
-        typical.append((strategy, strategy.record(int(strategy.ensemble.runs[place]))))
+        index = 0 if group.comparison is None else typical_run(group.comparison, strategy.label)
+        typical.append((strategy, strategy.record(int(strategy.ensemble.runs[index]))))
     return tuple(typical)
 
 
@@ -191,13 +191,13 @@ def _consistency_drawings(strategies: Sequence[Strategy]) -> Iterator[Drawing]:
         "Normalised squared error of the estimated positions, averaged over the runs; 1 where covariances are right. "
         "Band: where 95 % of the averages of a consistent filter lie."
     )
-    if all(np.array_equal(each.ensemble.times, times) for each in strategies):
-        averages = {each.label: nees_over_runs(each, 2) for each in strategies}
+    if all(np.array_equal(strategy.ensemble.times, times) for strategy in strategies):
+        averages = {strategy.label: nees_over_runs(strategy, 2) for strategy in strategies}
         yield Drawing("consistency", "Consistency", caption, consistency_figure(times, averages))
         return
-    for each in strategies:
-        figure = consistency_figure(each.ensemble.times, {each.label: nees_over_runs(each, 2)})
-        yield Drawing(f"consistency-{each.cell.name}", f"Consistency, {each.name}", caption, figure)
+    for strategy in strategies:
+        figure = consistency_figure(strategy.ensemble.times, {strategy.label: nees_over_runs(strategy, 2)})
+        yield Drawing(f"consistency-{strategy.cell.name}", f"Consistency, {strategy.name}", caption, figure)
 
 
 def sweep_drawings(campaign: Campaign, errors: Mapping[str, Floats]) -> Iterator[Drawing]:
@@ -230,11 +230,11 @@ def sweep_drawings(campaign: Campaign, errors: Mapping[str, Floats]) -> Iterator
 
 def _panels(campaign: Campaign, cells: Sequence[Cell], axis: str) -> dict[str, dict[str, list[Cell]]]:
     """Return for each setting of the other axes, and each strategy, its cells along the axis."""
-    others = [name for name, values in campaign.axes.items() if len(values) > 1 and name != axis]
-    lines = campaign.compare if campaign.compare in others else ("planner" if "planner" in others else "")
+    other_axes = [name for name, values in campaign.axes.items() if len(values) > 1 and name != axis]
+    lines = campaign.compare if campaign.compare in other_axes else ("planner" if "planner" in other_axes else "")
     panels: dict[str, dict[str, list[Cell]]] = {}
     for cell in cells:
-        shared = describe_settings(cell, (name for name in others if name != lines))
+        shared = describe_settings(cell, (name for name in other_axes if name != lines))
         curve = str(cell.settings[lines]) if lines else cell.planner
         panels.setdefault(shared, {}).setdefault(curve, []).append(cell)
     return panels

@@ -233,9 +233,9 @@ def _inline_figures(
     inlined = []
     for number, each in enumerate(drawings):
         description = f"{each.title}. {each.caption}"
-        shown = inline_svg(each.figure, f"{prefix}-{number}", description, names)
-        if len(shown) <= MAX_DRAWING_BYTES:
-            inlined.append((each, shown))
+        svg = inline_svg(each.figure, f"{prefix}-{number}", description, names)
+        if len(svg) <= MAX_DRAWING_BYTES:
+            inlined.append((each, svg))
         else:
             inlined.append((replace(each, caption=f"{each.caption} {_IN_DOTS}"), inline_png(each.figure, description)))
     return tuple(inlined)

@@ -118,18 +118,18 @@ class LiveScreen:
         time = None if state.start is None or belief.time is None else belief.time + state.start
         estimates = None if time is None else self.live.estimate(belief.fused, belief.step)
         extent = self._extent(poses[:, :2], np.empty((0, 2)) if estimates is None else estimates.means[:, :2])
-        places = decimals_for(extent)
+        decimals = decimals_for(extent)
         frame = {
             "scene": self._scene,
             "time": time,
             "utc": 0.0 if state.is_utc else None,
-            "extent": rounded_list(extent, places),
+            "extent": rounded_list(extent, decimals),
             "estimates": []
             if estimates is None
-            else [[*estimate_data(estimates, i, places), 0, 0.0] for i in range(len(estimates.labels))],
+            else [[*estimate_data(estimates, i, decimals), 0, 0.0] for i in range(len(estimates.labels))],
             "heights": height_data(estimates) if estimates is not None and self._scenario.model.has_heights else [],
-            "poses": [pose_data(*each, places) for each in zip(poses, self._sections, strict=True)],
-            "scans": self._scans(timeline, places),
+            "poses": [pose_data(*each, decimals) for each in zip(poses, self._sections, strict=True)],
+            "scans": self._scans(timeline, decimals),
             "decision": self._decision_data(poses),
             "health": self._health(timeline),
             "silence": self._silence(state),
@@ -145,18 +145,18 @@ class LiveScreen:
         }
         return json.dumps(frame, allow_nan=False, separators=(",", ":")).encode()
 
-    def _extent(self, *places: Floats) -> tuple[float, float, float, float]:
+    def _extent(self, *positions: Floats) -> tuple[float, float, float, float]:
         """Return x_min, x_max, y_min, y_max, m, of the region and points beyond, in steps that keep the view stable."""
         region = self._scenario.model.region
         low, high = np.array([region.x_min, region.y_min]), np.array([region.x_max, region.y_max])
-        points = np.concatenate([low[np.newaxis], high[np.newaxis], *places])
+        points = np.concatenate([low[np.newaxis], high[np.newaxis], *positions])
         points = points[np.isfinite(points).all(axis=1)]
         step = float((high - low).max()) / _STEPS_OF_EXTENT
         below, above = (np.maximum(0.0, low - points).max(axis=0), np.maximum(0.0, points - high).max(axis=0))
         (x_min, y_min), (x_max, y_max) = low - step * np.ceil(below / step), high + step * np.ceil(above / step)
         return float(x_min), float(x_max), float(y_min), float(y_max)
 
-    def _scans(self, timeline: Timeline, places: int) -> list[list[list[float]]]:
+    def _scans(self, timeline: Timeline, decimals: int) -> list[list[list[float]]]:
         """Return the measurements at the latest scan time."""
         if not timeline.entries:
             return [[] for _ in self._sections]
@@ -167,7 +167,7 @@ class LiveScreen:
             for scan in scans
         )
         return [
-            measurement_data(scan, section.measurement.kind, pose, places)
+            measurement_data(scan, section.measurement.kind, pose, decimals)
             for scan, section, pose in zip(drawn, self._sections, latest.poses, strict=True)
         ]
 
@@ -187,9 +187,9 @@ class LiveScreen:
         if not latest:
             return ""
         health = Health.unreported(len(latest), len(self._sections))
-        for place, instant in enumerate(latest):
-            health.note_filters(place, instant.info.filters)
-            health.note_fusion(place, instant.info.fusion)
+        for index, instant in enumerate(latest):
+            health.note_filters(index, instant.info.filters)
+            health.note_fusion(index, instant.info.fusion)
         return diagnostics_line(run_diagnostics(health, self._names))
 
     def _silence(self, state: LiveState) -> list[float | None]:

@@ -15,9 +15,9 @@ def spec_toml(spec: Mapping[str, Any]) -> str:
 
 
 def _lines(table: Mapping[str, Any], path: tuple[str, ...]) -> list[str]:
-    given = {key: value for key, value in table.items() if value not in (None, [], (), {})}
-    lines = [f"{_key(key)} = {_value(value)}" for key, value in given.items() if not _is_table(value)]
-    for key, value in given.items():
+    entries = {key: value for key, value in table.items() if value not in (None, [], (), {})}
+    lines = [f"{_key(key)} = {_value(value)}" for key, value in entries.items() if not _is_table(value)]
+    for key, value in entries.items():
         name = ".".join(_key(part) for part in (*path, key))
         if isinstance(value, Mapping):
             lines += ["", f"[{name}]", *_lines(value, (*path, key))]

@@ -42,14 +42,14 @@ def replay_data(strategy: Strategy, record: RunRecord, group: str, *, trust: boo
     """
     scenario = strategy.cell.scenario
     extent = _extent(record, scenario)
-    places = decimals_for(extent)
+    decimals = decimals_for(extent)
     scene, names, sections = strategy.scene, scenario.model.sensor_names, scenario.model.sensors
     sensors = [sensor_data(name, section) for name, section in zip(names, sections, strict=True)]
     has_velocity = scenario.model.motion.kind != "custom"
     is_known, origin = scenario.model.targets.kind != "unknown", scenario.model.origin
     metadata = recording_metadata(record, scenario)
     axes = dict[str, dict[str, Any]]()
-    decisions = [decision_data(each, axes, names) for each in record.decisions]
+    decisions = [decision_data(decision, axes, names) for decision in record.decisions]
     return {
         "cell": strategy.cell.name,
         "group": group,
@@ -58,18 +58,18 @@ def replay_data(strategy: Strategy, record: RunRecord, group: str, *, trust: boo
         "mean": _mean_error(strategy, record) if is_known else None,
         "run": record.run,
         "labelled": strategy.has_labels,
-        "extent": rounded_list(extent, places),
-        "zones": [[zone.kind, [rounded_list(corner, places) for corner in zone.corners]] for zone in scene.zones],
+        "extent": rounded_list(extent, decimals),
+        "zones": [[zone.kind, [rounded_list(corner, decimals) for corner in zone.corners]] for zone in scene.zones],
         "sensors": sensors,
         "times": rounded_list(record.times, 6),
-        "truth": [_targets(record, scan, places, has_velocity) for scan in range(record.num_scans)],
-        "estimates": _estimates(record, scenario, places),
+        "truth": [_targets(record, scan, decimals, has_velocity) for scan in range(record.num_scans)],
+        "estimates": _estimates(record, scenario, decimals),
         **({"heights": _heights(record)} if scenario.model.has_heights else {}),
         "poses": [
-            [pose_data(pose, section, places) for pose, section in zip(poses, sections, strict=True)]
+            [pose_data(pose, section, decimals) for pose, section in zip(poses, sections, strict=True)]
             for poses in record.poses
         ],
-        "scans": _scans(record, scenario, places, trust),
+        "scans": _scans(record, scenario, decimals, trust),
         "recorded": scenario.model.recording is not None,
         "known": is_known,
         "names": metadata.names,
@@ -90,9 +90,9 @@ def _mean_error(strategy: Strategy, record: RunRecord) -> float | None:
     return round(float(record.ospa[counted, 0].mean()), 2) if counted.any() else None
 
 
-def rounded_list(values: Any, places: int) -> list[float]:
+def rounded_list(values: Any, decimals: int) -> list[float]:
     """Return rounded numbers as a list."""
-    return [round(float(value), places) for value in values]
+    return [round(float(value), decimals) for value in values]
 
 
 def decimals_for(extent: Sequence[float]) -> int:
@@ -132,25 +132,25 @@ def sensor_data(name: str, section: SensorSection) -> dict[str, Any]:
     return data
 
 
-def pose_data(pose: Floats, section: SensorSection, places: int) -> list[float]:
+def pose_data(pose: Floats, section: SensorSection, decimals: int) -> list[float]:
     """Return position and heading; for a camera also its field of view: middle and half width in rad, reach in m."""
-    pose_numbers = [*rounded_list(pose[:2], places), round(float(pose[2]), 4)]
+    pose_numbers = [*rounded_list(pose[:2], decimals), round(float(pose[2]), 4)]
     if section.detection.kind == "camera":
         field = field_of_view(section, pose.tolist())
-        pose_numbers += [] if field is None else [*rounded_list(field[:2], 4), round(field.reach, places)]
+        pose_numbers += [] if field is None else [*rounded_list(field[:2], 4), round(field.reach, decimals)]
     return pose_numbers
 
 
-def _targets(record: RunRecord, scan: int, places: int, has_velocity: bool) -> list[list[float]]:
+def _targets(record: RunRecord, scan: int, decimals: int, has_velocity: bool) -> list[list[float]]:
     """Return number (from 1) and position of each target, and its velocity unless the motion model is custom."""
     ids, states = record.truth.at(scan)
     return [
-        [target + 1, *rounded_list(state[:2], places), *(rounded_list(state[2:4], 2) if has_velocity else [])]
+        [target + 1, *rounded_list(state[:2], decimals), *(rounded_list(state[2:4], 2) if has_velocity else [])]
         for target, state in zip(ids.tolist(), states, strict=True)
     ]
 
 
-def _estimates(record: RunRecord, scenario: Scenario, places: int) -> list[list[list[Any]]]:
+def _estimates(record: RunRecord, scenario: Scenario, decimals: int) -> list[list[list[Any]]]:
     """Return the estimates of each scan with the matched targets.
 
     Each has label, position, existence, ellipse (semi-axes in m, angle in rad), matched target, and error. Target and
@@ -159,7 +159,7 @@ def _estimates(record: RunRecord, scenario: Scenario, places: int) -> list[list[
     score = scenario.model.ospa
     matching = match_run(record.truth, record.estimates, cutoff=score.cutoff, order=score.order)
     partners = {
-        (scan, *label, *mean): (int(record.truth.ids[row]) + 1, round(distance, places))
+        (scan, *label, *mean): (int(record.truth.ids[row]) + 1, round(distance, decimals))
         for scan, label, mean, row, distance in zip(
             matching.scans.tolist(),
             matching.labels.tolist(),
@@ -172,9 +172,9 @@ def _estimates(record: RunRecord, scenario: Scenario, places: int) -> list[list[
     estimates = []
     for scan, estimate in enumerate(record.estimates):
         rows: list[list[Any]] = []
-        for place, label in enumerate(estimate.labels.tolist()):
-            partner = partners.get((scan, *label, *estimate.means[place, :2].tolist()), (0, 0.0))
-            rows.append([*estimate_data(estimate, place, places), *partner])
+        for index, label in enumerate(estimate.labels.tolist()):
+            partner = partners.get((scan, *label, *estimate.means[index, :2].tolist()), (0, 0.0))
+            rows.append([*estimate_data(estimate, index, decimals), *partner])
         estimates.append(rows)
     return estimates
 
@@ -184,12 +184,12 @@ def _heights(record: RunRecord) -> dict[str, Any]:
 
     Targets without heights have none.
     """
-    found: dict[str, Any] = {"estimates": [], "truth": []}
+    heights: dict[str, Any] = {"estimates": [], "truth": []}
     for scan, estimate in enumerate(record.estimates):
-        found["estimates"].append(height_data(estimate))
+        heights["estimates"].append(height_data(estimate))
         _, states = record.truth.at(scan)
-        found["truth"].append(rounded_list(states[:, HEIGHT], 0) if states.shape[1] > HEIGHT else [])
-    return found
+        heights["truth"].append(rounded_list(states[:, HEIGHT], 0) if states.shape[1] > HEIGHT else [])
+    return heights
 
 
 def height_data(estimate: Estimate) -> list[list[float]]:
@@ -198,20 +198,20 @@ def height_data(estimate: Estimate) -> list[list[float]]:
     return [rounded_list(pair, 0) for pair in zip(estimate.means[:, HEIGHT], stds, strict=True)]
 
 
-def estimate_data(estimate: Estimate, place: int, places: int) -> list[Any]:
+def estimate_data(estimate: Estimate, index: int, decimals: int) -> list[Any]:
     """Return label, position, existence and ellipse (semi-axes in m, angle in rad) of one target of an estimate."""
-    born, number = estimate.labels[place].tolist()
-    position, existence = rounded_list(estimate.means[place, :2], places), round(float(estimate.existence[place]), 4)
-    return [f"{born}.{number}", *position, existence, *_ellipse(estimate.covs[place, :2, :2], places)]
+    born, number = estimate.labels[index].tolist()
+    position, existence = rounded_list(estimate.means[index, :2], decimals), round(float(estimate.existence[index]), 4)
+    return [f"{born}.{number}", *position, existence, *_ellipse(estimate.covs[index, :2, :2], decimals)]
 
 
-def _ellipse(cov: Floats, places: int) -> list[float]:
+def _ellipse(cov: Floats, decimals: int) -> list[float]:
     variances, axes = np.linalg.eigh(cov)
     semi = _SIGMAS * np.sqrt(np.maximum(variances, 0.0))
-    return [*rounded_list(semi[::-1], places), round(math.atan2(axes[1, 1], axes[0, 1]), 3)]
+    return [*rounded_list(semi[::-1], decimals), round(math.atan2(axes[1, 1], axes[0, 1]), 3)]
 
 
-def _scans(record: RunRecord, scenario: Scenario, places: int, trust: bool) -> list[list[list[list[float]]]]:
+def _scans(record: RunRecord, scenario: Scenario, decimals: int, trust: bool) -> list[list[list[list[float]]]]:
     """Return for each scan and sensor its measurements, see `measurement_data`.
 
     Empty if the models of the scenario, or its recording, are not available.
@@ -224,19 +224,19 @@ def _scans(record: RunRecord, scenario: Scenario, places: int, trust: bool) -> l
     except VedetteError:
         return []
     return [
-        [measurement_data(scan, kind, pose, places) for scan, kind, pose in zip(sensors, kinds, poses, strict=True)]
+        [measurement_data(scan, kind, pose, decimals) for scan, kind, pose in zip(sensors, kinds, poses, strict=True)]
         for sensors, poses in zip(scans, record.poses, strict=True)
     ]
 
 
-def measurement_data(scan: Scan | None, kind: str, pose: Floats, places: int) -> list[list[float]]:
+def measurement_data(scan: Scan | None, kind: str, pose: Floats, decimals: int) -> list[list[float]]:
     """Return for each measurement of a scan its target (0: clutter, -1: unknown), and its position in the plane."""
     if scan is None or kind not in PLANE_SHAPES:
         return []
-    digits = _ANGLE_DIGITS if PLANE_SHAPES[kind] == "ray" else places
-    lie = plane_coordinates(scan.measurements, kind, pose)
+    digits = _ANGLE_DIGITS if PLANE_SHAPES[kind] == "ray" else decimals
+    points = plane_coordinates(scan.measurements, kind, pose)
     return [
-        [origin + 1, *rounded_list(place, digits)] for origin, place in zip(scan.origins.tolist(), lie, strict=True)
+        [origin + 1, *rounded_list(point, digits)] for origin, point in zip(scan.origins.tolist(), points, strict=True)
     ]
 
 
@@ -276,12 +276,12 @@ def _curves(plan: Plan, axes: dict[str, dict[str, Any]]) -> list[dict[str, Any]]
     """
     curves = []
     for table in plan.tables:
-        for place, sensor in enumerate(table.sensors):
+        for position, sensor in enumerate(table.sensors):
             if len(plan.actions[sensor]) == 1:
                 continue
             along = action_axis(plan.actions[sensor])
             order = np.argsort(along.places, kind="stable")
-            mean, error = best_over_others(table, place)
+            mean, error = best_over_others(table, position)
             axis = {
                 "axis": along.title(),
                 "numeric": along.is_numeric,

@@ -60,10 +60,10 @@ def write_figures(results: CampaignResults, path: str | Path) -> tuple[Path, ...
     folder = _made(path)
     written: list[Path] = []
     errors: dict[str, Floats] = {}
-    several = len(results.campaign.groups()) > 1
+    several_groups = len(results.campaign.groups()) > 1
     for group in comparison_groups(results):
         errors.update(run_errors(group))
-        prefix = f"{group.name}-" if several else ""
+        prefix = f"{group.name}-" if several_groups else ""
         written += _save(group_drawings(group), folder, prefix)
         if group.comparison is not None:  # one figure of what the page shows separately
             first, record = typical_records(group)[0]
@@ -109,7 +109,7 @@ def run_errors(group: Group) -> dict[str, Floats]:
         return {}
     comparison = group.comparison
     return {
-        each.cell.name: comparison.run_means(each.label)
-        for each in group.strategies
-        if each.label in comparison.strategies
+        strategy.cell.name: comparison.run_means(strategy.label)
+        for strategy in group.strategies
+        if strategy.label in comparison.strategies
     }

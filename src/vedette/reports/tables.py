@@ -117,12 +117,12 @@ def error_table(group: Group) -> Table | None:
     """Return OSPA and its parts, and the paired differences; None without common runs."""
     if group.comparison is None:
         return None
-    several = group.comparison.num_runs > 1
+    several_runs = group.comparison.num_runs > 1
     rows = tuple(
         (
             strategy_label(name),
             *(with_minus(cell) for cell in cells),
-            *(strategy_tail(group.comparison, name).cells() if several else ()),
+            *(strategy_tail(group.comparison, name).cells() if several_runs else ()),
         )
         for name, *cells in strategy_rows(group.comparison)
     )
@@ -131,45 +131,45 @@ def error_table(group: Group) -> Table | None:
     over = f"over t = {counted[0]:g} to {counted[-1]:g} s"
     caption = (
         f"Mean over {group.comparison.num_runs} paired runs and {over}, ± one standard error."
-        if several
+        if several_runs
         else f"1 {'paired ' if len(rows) > 1 else ''}run, mean {over}."
     )
     if len(rows) > 1:
-        won = f", run by run, so above 0 where {first} is better; runs won: by {first}." if several else "."
+        won = f", run by run, so above 0 where {first} is better; runs won: by {first}." if several_runs else "."
         caption += f" Difference: strategy minus {first}{won}"
-    if several:
+    if several_runs:
         caption += " A target is lost at the end where it has no estimate within the cutoff at the last of these scans."
-    more = tail_header(group.comparison.unit) if several else ()
+    more = tail_header(group.comparison.unit) if several_runs else ()
     names = (*header(group.comparison), *more)
     if len(rows) == 1:  # drop the differences
-        places = [place for place in range(len(names)) if place not in _DIFFERENCES]
-        names, rows = tuple(names[place] for place in places), (tuple(rows[0][place] for place in places),)
+        columns = [column for column in range(len(names)) if column not in _DIFFERENCES]
+        names, rows = tuple(names[column] for column in columns), (tuple(rows[0][column] for column in columns),)
     return Table(caption, names, rows)
 
 
 def measure_table(group: Group) -> Table | None:
     """Return the metrics other than OSPA, one column per strategy; None if there are none."""
-    strategies = [each for each in group.strategies if each.ensemble.measures]
+    strategies = [strategy for strategy in group.strategies if strategy.ensemble.measures]
     if not strategies:
         return None
     score = strategies[0].cell.scenario.model.ospa
     kinds = (*_kinds(score.order), *_own_kinds(strategies))
-    rows = [(kind.name, *(_over_runs(kind, each) for each in strategies)) for kind in kinds]
+    rows = [(kind.name, *(_over_runs(kind, strategy) for strategy in strategies)) for kind in kinds]
     notes = [kind.note for kind in kinds]
     for name, note, dim in _consistency_kinds(strategies):
-        rows.append((name, *(_consistency(each, dim) for each in strategies)))
+        rows.append((name, *(_consistency(strategy, dim) for strategy in strategies)))
         notes.append(note)
         if dim == 2:
             rows += _spread_rows(strategies)
             notes += ["of the means at the scans of all runs", "of a single estimate, with its run and time"]
-    several = any(each.ensemble.num_runs > 1 for each in strategies)
-    over = "Mean over the runs ± one standard error" if several else "One run"
+    several_runs = any(strategy.ensemble.num_runs > 1 for strategy in strategies)
+    over = "Mean over the runs ± one standard error" if several_runs else "One run"
     caption = (
         f"{over}, over the same scans as above; cutoff {score.cutoff:g} m, order "
         f"{score.order:g}, window of OSPA(2) {score.window} scans. NEES / dimension is 1 for a consistent "
         "filter; in brackets, the share of the scans whose average over the runs lies in its 95 % interval."
     )
-    return Table(caption, ("Measure", *(each.name for each in strategies)), tuple(rows), tuple(notes))
+    return Table(caption, ("Measure", *(strategy.name for strategy in strategies)), tuple(rows), tuple(notes))
 
 
 def _consistency_kinds(strategies: Sequence[Strategy]) -> list[tuple[str, str, int]]:
@@ -234,14 +234,14 @@ def nees_spread(strategy: Strategy) -> NeesSpread | None:
 
 
 def _spread_rows(strategies: Sequence[Strategy]) -> Iterator[tuple[str, ...]]:
-    spreads = [nees_spread(each) for each in strategies]
-    yield "  median", *("\N{EN DASH}" if each is None else f"{each.median:.2f}" for each in spreads)
-    places = [None if each is None else f"(run {each.run}, {each.time:g} s)" for each in spreads]
+    spreads = [nees_spread(spread) for spread in strategies]
+    yield "  median", *("\N{EN DASH}" if spread is None else f"{spread.median:.2f}" for spread in spreads)
+    origins = [None if spread is None else f"(run {spread.run}, {spread.time:g} s)" for spread in spreads]
     yield (
         "  largest",
         *(
-            f"{each.largest:.4g} {place}" if each else "\N{EN DASH}"
-            for each, place in zip(spreads, places, strict=True)
+            f"{spread.largest:.4g} {origin}" if spread else "\N{EN DASH}"
+            for spread, origin in zip(spreads, origins, strict=True)
         ),
     )
 
@@ -268,16 +268,16 @@ def stage_seconds(strategy: Strategy) -> dict[str, NDArray[np.float32]]:
 
 def cost_table(group: Group) -> Table | None:
     """Return the time of each stage: median and 95th percentile, one column per strategy; None if nothing was timed."""
-    spent = {each.name: stage_seconds(each) for each in group.strategies}
-    stages = list(dict.fromkeys(stage for seconds in spent.values() for stage in seconds))
+    seconds_of = {strategy.name: stage_seconds(strategy) for strategy in group.strategies}
+    stages = list(dict.fromkeys(stage for seconds in seconds_of.values() for stage in seconds))
     if not stages:
         return None
-    rows = tuple((stage, *(_milliseconds(seconds.get(stage)) for seconds in spent.values())) for stage in stages)
+    rows = tuple((stage, *(_milliseconds(seconds.get(stage)) for seconds in seconds_of.values())) for stage in stages)
     caption = (
         "Wall time in milliseconds: median of n values, and where there are at least "
         f"{MIN_FOR_TAILS} of them the 95th percentile in brackets."
     )
-    return Table(caption, ("Stage", *spent), rows)
+    return Table(caption, ("Stage", *seconds_of), rows)
 
 
 def _milliseconds(seconds: NDArray[np.float32] | None) -> str:

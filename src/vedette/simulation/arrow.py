@@ -97,7 +97,7 @@ def stacked(
     names = names or list(dict.fromkeys([*layout.fixed, *(name for part in parts for name in part)]))
     if others := {name for part in parts for name in part} - set(names):
         raise InputError(f"column {shown(min(others))}: expected one of {', '.join(names)}")
-    lengths = num_rows or [next((len(of) for of in part.values() if not np.isscalar(of)), 1) for part in parts]
+    lengths = num_rows or [next((len(data) for data in part.values() if not np.isscalar(data)), 1) for part in parts]
     joined: Columns = {}
     for name in names:
         kind = layout.kind(name)
@@ -110,13 +110,13 @@ def stacked(
 def _joined(column: list[Any], lengths: Sequence[int], kind: Kind) -> Any:
     if kind is Kind.TEXT:
         parts = zip(column, lengths, strict=True)
-        return [text for of, num in parts for text in ([of] * num if isinstance(of, str) else of)]
+        return [text for values, num in parts for text in ([values] * num if isinstance(values, str) else values)]
     if not column:
         return np.empty(0, _DTYPES[kind])
-    whole = np.concatenate(
-        [np.full(num, of) if np.isscalar(of) else of for of, num in zip(column, lengths, strict=True)]
+    joined = np.concatenate(
+        [np.full(num, values) if np.isscalar(values) else values for values, num in zip(column, lengths, strict=True)]
     )
-    return whole if kind is Kind.NUMBER else whole.astype(_DTYPES[kind], copy=False)
+    return joined if kind is Kind.NUMBER else joined.astype(_DTYPES[kind], copy=False)
 
 
 def to_arrow(columns: Columns, layout: Layout, *, nan_is_null: bool = False) -> pa.RecordBatch:
@@ -145,8 +145,8 @@ def to_arrow(columns: Columns, layout: Layout, *, nan_is_null: bool = False) -> 
 def _texts(texts: list[Any]) -> pa.Array:
     import pyarrow as pa
 
-    known = {text: text.encode() for text in set(texts)}
-    encoded = [known[text] for text in texts]
+    encoded_text = {text: text.encode() for text in set(texts)}
+    encoded = [encoded_text[text] for text in texts]
     offsets = np.cumsum([0, *map(len, encoded)])
     if offsets[-1] > _MOST_TEXT:
         raise InputError(f"column of texts: expected at most {_MOST_TEXT} bytes; got {offsets[-1]}")
@@ -164,10 +164,10 @@ def _numbers(column: Any, kind: Kind, nan_is_null: bool) -> pa.Array:
         values = np.where(missing, 0, values)
     elif kind is Kind.VALUE or (nan_is_null and kind is Kind.NUMBER):
         missing = np.isnan(values)
-    known = pa.py_buffer(_bits(~missing)) if missing.any() else None
+    validity = pa.py_buffer(_bits(~missing)) if missing.any() else None
     is_truth = values.dtype == bool
     content, values_type = (_bits(values), pa.bool_()) if is_truth else (values, pa.from_numpy_dtype(values.dtype))
-    return pa.Array.from_buffers(values_type, len(values), [known, pa.py_buffer(content)])
+    return pa.Array.from_buffers(values_type, len(values), [validity, pa.py_buffer(content)])
 
 
 def _bits(truths: Bools) -> NDArray[np.uint8]:
@@ -176,13 +176,13 @@ def _bits(truths: Bools) -> NDArray[np.uint8]:
 
 def _values(column: pa.Array, kind: Kind) -> NDArray[Any]:
     """Return the numbers of a column as a copy; -1 or NaN for null."""
-    known, content = column.buffers()
+    validity, content = column.buffers()
     bits = slice(column.offset, column.offset + len(column))
     if kind is Kind.TRUTH:
         return _truths(content)[bits]
     values: NDArray[Any] = np.frombuffer(content or b"", _DTYPES[kind])[bits].copy()
     if column.null_count:
-        values[~_truths(known)[bits]] = -1 if kind is Kind.COUNT else np.nan
+        values[~_truths(validity)[bits]] = -1 if kind is Kind.COUNT else np.nan
     return values
 
 

@@ -62,14 +62,14 @@ class PoissonTargets:
         alive = np.zeros((len(births), len(scans)), np.bool_)
         states = np.zeros((len(births), len(scans), len(self.mean)))
         for target, (birth, state) in enumerate(zip(births.tolist(), starts, strict=True)):
-            life = self._life(state, scans[birth:], rng)
-            alive[target, birth : birth + len(life)] = True
-            states[target, birth : birth + len(life)] = life
+            trajectory = self._life(state, scans[birth:], rng)
+            alive[target, birth : birth + len(trajectory)] = True
+            states[target, birth : birth + len(trajectory)] = trajectory
         return Truth.from_arrays(scans, alive, states)
 
     def _life(self, state: Floats, times: Floats, rng: np.random.Generator) -> Floats:
         """(num_scans of its life, state_dim) states of a target from its first scan."""
-        life: list[Floats] = []
+        states: list[Floats] = []
         for scan in range(len(times)):
             if scan > 0:
                 if rng.random() < self.death_probability:
@@ -78,5 +78,5 @@ class PoissonTargets:
                 state = moved_states(self.motion, state[np.newaxis], dt, normals, np.ones(1, np.bool_))[0]
             if self.region is not None and not self.region.contains(state[np.newaxis, :2])[0]:
                 break
-            life.append(state)
-        return np.array(life).reshape(-1, len(state))
+            states.append(state)
+        return np.array(states).reshape(-1, len(state))

@@ -46,16 +46,16 @@ class CovarianceRecursion:
         cost is the sum over scans and targets of min(sqrt(tr P), cutoff), with P of the position in the fused density.
         """
         costs = np.zeros(len(actions))
-        beliefs: list[Floats] = [np.broadcast_to(own, (len(actions), *own.shape)) for own in covs]
-        for k, (moved, noise) in enumerate(zip(self.transitions, self.noises, strict=True)):
-            information = [own[actions[:, s], k] for s, own in enumerate(self.sensor_information)]
-            infos: list[Floats] = [_inverse(moved @ own @ moved.swapaxes(-1, -2) + noise) for own in beliefs]
+        beliefs: list[Floats] = [np.broadcast_to(cov, (len(actions), *cov.shape)) for cov in covs]
+        for k, (transition, noise) in enumerate(zip(self.transitions, self.noises, strict=True)):
+            information = [of_courses[actions[:, s], k] for s, of_courses in enumerate(self.sensor_information)]
+            infos: list[Floats] = [_inverse(transition @ cov @ transition.swapaxes(-1, -2) + noise) for cov in beliefs]
             if self.one_belief:
                 beliefs = [_inverse(infos[0] + self._summed(information))]
                 fused = beliefs[0]
             else:
-                infos = [own + scan for own, scan in zip(infos, information, strict=True)]
-                beliefs = [_inverse(own) for own in infos]
+                infos = [info + scan for info, scan in zip(infos, information, strict=True)]
+                beliefs = [_inverse(info) for info in infos]
                 fused = _inverse(self._summed(infos))
             errors = np.sqrt(fused[..., 0, 0] + fused[..., 1, 1])
             costs += np.minimum(errors, self.cutoff) @ self.alive[k]
@@ -63,7 +63,7 @@ class CovarianceRecursion:
 
     def _summed(self, informations: Sequence[Floats]) -> Floats:
         """Return the sum of the informations, weighted by the sensors' powers."""
-        return np.asarray(sum(power * own for power, own in zip(self.powers, informations, strict=True)))
+        return np.asarray(sum(power * info for power, info in zip(self.powers, informations, strict=True)))
 
 
 def _inverse(matrices: Floats) -> Floats:
@@ -72,8 +72,8 @@ def _inverse(matrices: Floats) -> Floats:
 
 def transition_jacobians(motion: MotionModel, states: Floats, dt: float) -> Floats:
     """(num, dim, dim) derivatives of the motion over `dt` seconds at (num, dim) states, by central differences."""
-    moved = motion.propagate(_shifted(states), dt).reshape(2, motion.state_dim, *states.shape)
-    return np.moveaxis((moved[0] - moved[1]) / (2.0 * _STEP), 0, -1)
+    propagated = motion.propagate(_shifted(states), dt).reshape(2, motion.state_dim, *states.shape)
+    return np.moveaxis((propagated[0] - propagated[1]) / (2.0 * _STEP), 0, -1)
 
 
 def scan_information(sensor: SensorModel, states: Floats, pose: Floats) -> Floats:

@@ -69,33 +69,33 @@ def decision_tables(decisions: Sequence[Decision], num_sensors: int) -> dict[str
     """
     of_decisions = [
         {
-            **decision_columns(number, each),
-            "planner": each.plan.planner,
-            "notes": _notes(each.plan),
-            **_counts(each.plan),
+            **decision_columns(number, decision),
+            "planner": decision.plan.planner,
+            "notes": _notes(decision.plan),
+            **_counts(decision.plan),
         }
-        for number, each in enumerate(decisions)
+        for number, decision in enumerate(decisions)
     ]
-    if sum(table.mean.size for each in decisions for table in each.plan.tables) > _MOST_REWARDS:
+    if sum(table.mean.size for decision in decisions for table in decision.plan.tables) > _MOST_REWARDS:
         raise InputError(f"plan.tables: expected at most {_MOST_REWARDS} entries in all; got more")
-    joint, own = [], []
-    for number, each in enumerate(decisions):
-        for place, table in enumerate(each.plan.tables):
-            rows = {**decision_columns(number, each), "reward_table": place, **_evaluated(table, each.plan)}
+    joint_rows, own_rows = [], []
+    for number, decision in enumerate(decisions):
+        for index, table in enumerate(decision.plan.tables):
+            rows = {**decision_columns(number, decision), "reward_table": index, **_evaluated(table, decision.plan)}
             if len(table.sensors) > 1 or num_sensors <= _FEW_SENSORS:
-                joint.append(rows)
+                joint_rows.append(rows)
             else:
                 (sensor,) = table.sensors
-                own.append({"sensor": sensor, "action": rows.pop(f"action_{sensor}"), **rows})
+                own_rows.append({"sensor": sensor, "action": rows.pop(f"action_{sensor}"), **rows})
     start, end = (*DECISION, "reward_table"), ("reward", "reward_se", "chosen")
     names = (*start, *(f"action_{sensor}" for sensor in range(num_sensors)), *end)
     columns = {
         "decisions": stacked(of_decisions, DECISION_TABLES["decisions"]),
         "actions": _actions(decisions),
-        "rewards": stacked(joint, DECISION_TABLES["rewards"], names),
+        "rewards": stacked(joint_rows, DECISION_TABLES["rewards"], names),
     }
     layout = OWN_REWARDS["own_rewards"]
-    return {**columns, "own_rewards": stacked(own, layout, list(layout.fixed))} if own else columns
+    return {**columns, "own_rewards": stacked(own_rows, layout, list(layout.fixed))} if own_rows else columns
 
 
 def _counts(plan: Plan) -> dict[str, int]:
@@ -153,15 +153,15 @@ def _plan(
     room: int,
 ) -> Plan:
     options, chosen = [], []
-    for own in parts_of(actions, "sensor"):
-        if not np.array_equal(own["action"], np.arange(len(own["action"]))):
+    for part in parts_of(actions, "sensor"):
+        if not np.array_equal(part["action"], np.arange(len(part["action"]))):
             raise InputError("actions, column action: expected those of a sensor numbered from 0")
-        (choice,) = np.flatnonzero(own["chosen"])
+        (choice,) = np.flatnonzero(part["chosen"])
         chosen.append(int(choice))
-        names = [name for name in DECISION_TABLES["actions"].others(own) if not np.isnan(own[name]).all()]
-        values = np.empty((len(own["action"]), len(names)))
-        for place, name in enumerate(names):
-            values[:, place] = own[name]
+        names = [name for name in DECISION_TABLES["actions"].others(part) if not np.isnan(part[name]).all()]
+        values = np.empty((len(part["action"]), len(names)))
+        for column, name in enumerate(names):
+            values[:, column] = part[name]
         options.append(Actions(tuple(name.removeprefix("action_") for name in names), values))
     shape = tuple(len(values) for values in options)
     tables: dict[int, RewardTable] = {}
@@ -200,11 +200,11 @@ def _table(rewards: Mapping[str, Any], rows: slice, num_actions: tuple[int, ...]
     shape = tuple(num_actions[sensor] for sensor in sensors)
     if math.prod(shape) > room:
         raise InputError(f"rewards: expected tables of at most {_MOST_REWARDS} entries in all; got more")
-    place = np.ravel_multi_index(tuple(index[:, sensors].T), shape)  # raises for an action that does not exist
-    if np.any(np.diff(place) <= 0):
+    flat_index = np.ravel_multi_index(tuple(index[:, sensors].T), shape)  # raises for an action that does not exist
+    if np.any(np.diff(flat_index) <= 0):
         raise InputError("rewards: expected each combination of actions once, in order")
     mean, error = np.full(shape, np.nan), np.full(shape, np.nan)
-    mean.flat[place], error.flat[place] = rewards["reward"][rows], rewards["reward_se"][rows]
+    mean.flat[flat_index], error.flat[flat_index] = rewards["reward"][rows], rewards["reward_se"][rows]
     return RewardTable(tuple(sensors.tolist()), mean, error)
 
 
@@ -223,27 +223,27 @@ def _actions(decisions: Sequence[Decision]) -> Columns:
         {
             **decision_columns(number, decision),
             "sensor": sensor,
-            "action": np.arange(len(own)),
-            "chosen": np.arange(len(own)) == decision.plan.chosen[sensor],
-            **dict(zip(map(_column_of, own.columns), own.values.T, strict=True)),
+            "action": np.arange(len(actions)),
+            "chosen": np.arange(len(actions)) == decision.plan.chosen[sensor],
+            **dict(zip(map(_column_of, actions.columns), actions.values.T, strict=True)),
         }
         for number, decision in enumerate(decisions)
-        for sensor, own in enumerate(decision.plan.actions)
+        for sensor, actions in enumerate(decision.plan.actions)
     ]
-    numbers = _in_one_order([own.columns for decision in decisions for own in decision.plan.actions])
+    numbers = _in_one_order([actions.columns for decision in decisions for actions in decision.plan.actions])
     return stacked(parts, layout, [*layout.fixed, *map(_column_of, numbers)])
 
 
 def _in_one_order(orders: Sequence[Sequence[str]]) -> tuple[str, ...]:
     """Return the columns of all sensors in an order that keeps the order of each sensor."""
     sorter: TopologicalSorter[str] = TopologicalSorter()
-    for own in dict.fromkeys(map(tuple, orders)):
-        for place, name in enumerate(own):
-            sorter.add(name, *own[max(place - 1, 0) : place])
+    for columns in dict.fromkeys(map(tuple, orders)):
+        for position, name in enumerate(columns):
+            sorter.add(name, *columns[max(position - 1, 0) : position])
     try:
         return tuple(sorter.static_order())
     except CycleError:
-        listed = " and ".join(", ".join(own) for own in dict.fromkeys(map(tuple, orders)))
+        listed = " and ".join(", ".join(columns) for columns in dict.fromkeys(map(tuple, orders)))
         raise InputError(f"plan.actions: expected columns in one order for all; got {listed}") from None
 
 

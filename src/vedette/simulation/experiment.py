@@ -82,11 +82,11 @@ class Experiment(SummaryRepr):
             self._check_scans_at(np.asarray(self.scans_at))
 
     def _check_scans_at(self, table: Bools) -> None:
-        wanted = f"booleans of shape ({self.num_sensors}, {len(self.times)} or more)"
+        expected = f"booleans of shape ({self.num_sensors}, {len(self.times)} or more)"
         if table.dtype != np.bool_ or table.ndim != 2:
-            raise InputError(f"scans_at: expected {wanted}; got {table.dtype} of shape {table.shape}")
+            raise InputError(f"scans_at: expected {expected}; got {table.dtype} of shape {table.shape}")
         if len(table) != self.num_sensors or table.shape[1] < len(self.times):
-            raise InputError(f"scans_at: expected {wanted}; got shape {table.shape}")
+            raise InputError(f"scans_at: expected {expected}; got shape {table.shape}")
 
     @property
     def num_sensors(self) -> int:

@@ -57,8 +57,8 @@ def explanation_tables(decisions: Sequence[Decision], num_sensors: int) -> dict[
 
     Raises `InputError` for explanations with another number of sensors.
     """
-    explained = [(number, each, each.plan.explanation) for number, each in enumerate(decisions)]
-    stored = [(number, each, explanation) for number, each, explanation in explained if explanation is not None]
+    explained = [(number, decision, decision.plan.explanation) for number, decision in enumerate(decisions)]
+    stored = [(number, decision, explanation) for number, decision, explanation in explained if explanation is not None]
     for _, _, explanation in stored:
         for name in ("of_sensors", "reward_without_sensor"):
             values = getattr(explanation, name)
@@ -69,27 +69,27 @@ def explanation_tables(decisions: Sequence[Decision], num_sensors: int) -> dict[
     )  # only in runs whose actions have prices
     names = [*EXPLANATION_TABLES["explanations"].fixed, *priced, *(f"action_{sensor}" for sensor in range(num_sensors))]
     parts: dict[str, list[dict[str, Any]]] = {name: [] for name in EXPLANATION_TABLES}
-    for number, each, explanation in stored:
-        of, gains = decision_columns(number, each), explanation.of_targets
+    for number, decision, explanation in stored:
+        columns, gains = decision_columns(number, decision), explanation.of_targets
         parts["explanations"].append(
-            {**of, **_explanation_columns(explanation), **dict.fromkeys(priced, explanation.price)}
+            {**columns, **_explanation_columns(explanation), **dict.fromkeys(priced, explanation.price)}
         )
         if gains is not None:
             labels = {"birth_step": gains.labels[:, 0], "birth_site": gains.labels[:, 1]}
             gained = {"existence_gain": gains.existence, "localisation_gain": gains.localisation}
-            parts["target_gains"].append({**of, **labels, **gained})
+            parts["target_gains"].append({**columns, **labels, **gained})
         if explanation.of_sensors is not None and explanation.reward_without_sensor is not None:
             shares = {
                 "sensor": np.arange(num_sensors),
                 "gain": explanation.of_sensors,
                 "reward_without_sensor": explanation.reward_without_sensor,
             }
-            parts["sensor_gains"].append({**of, **shares})
+            parts["sensor_gains"].append({**columns, **shares})
     return {
         name: stacked(
-            of, EXPLANATION_TABLES[name], names if name == "explanations" else list(EXPLANATION_TABLES[name].fixed)
+            rows, EXPLANATION_TABLES[name], names if name == "explanations" else list(EXPLANATION_TABLES[name].fixed)
         )
-        for name, of in parts.items()
+        for name, rows in parts.items()
     }
 
 
@@ -152,7 +152,7 @@ def _explanation(
     has_sensors = len(sensors["sensor"]) > 0
     return Explanation(
         planner=plan.planner,
-        chosen=tuple(own.text(index) for own, index in zip(plan.actions, plan.chosen, strict=True)),
+        chosen=tuple(actions.text(index) for actions, index in zip(plan.actions, plan.chosen, strict=True)),
         reward=reward,
         standard_error=_number(table["reward_se"][row]),
         evaluations=int(table["evaluations"][row]),
@@ -175,9 +175,11 @@ def _gains(targets: Mapping[str, Any]) -> TargetGains:
 
 def _runner_up(plan: Plan, table: Mapping[str, Any], row: int) -> RunnerUp:
     actions = tuple(int(table[f"action_{s}"][row]) for s in range(plan.num_sensors))
-    for s, (own, index) in enumerate(zip(plan.actions, actions, strict=True)):
-        if not 0 <= index < len(own):
-            raise InputError(f"explanations, column action_{s}: expected an index of {len(own)} actions; got {index}")
+    for s, (available, index) in enumerate(zip(plan.actions, actions, strict=True)):
+        if not 0 <= index < len(available):
+            raise InputError(
+                f"explanations, column action_{s}: expected an index of {len(available)} actions; got {index}"
+            )
     error = _number(table["margin_se"][row])
     return RunnerUp(actions, table["runner_up"][row], float(table["margin"][row]), error)
 

@@ -160,8 +160,8 @@ class Journal:
 
     def _timings(self, num_scans: int) -> dict[str, Floats]:
         clocks, fusion = self._clocks[:num_scans], np.array(self._fusion[:num_scans])
-        spent = {stage: np.array([clock.seconds.get(stage, 0.0) for clock in clocks]) for stage in STAGES}
-        return spent | {"filter": np.maximum(spent["filter"] - fusion, 0.0), "fusion": fusion}
+        seconds = {stage: np.array([clock.seconds.get(stage, 0.0) for clock in clocks]) for stage in STAGES}
+        return seconds | {"filter": np.maximum(seconds["filter"] - fusion, 0.0), "fusion": fusion}
 
     def _partial(self, score: Score | None, stopped: str) -> RunRecord | None:
         """Return the record of a run that stopped; None if no scan is finished.

@@ -120,15 +120,15 @@ class OraclePlanner:
         instance("state", state, State)
         if self.truth is None:
             raise InputError("truth: expected the targets of the run, as of with_truth(); got None")
-        at = check_poses(poses, len(self.sensors))
-        options = options_of(self.sensors, at, self.settings)
-        mask = mask_of_decision(self.constraints, self.sensors, options, state.fused, at, self.settings)
+        current = check_poses(poses, len(self.sensors))
+        options = options_of(self.sensors, current, self.settings)
+        mask = mask_of_decision(self.constraints, self.sensors, options, state.fused, current, self.settings)
         step = max(state.step, 1)
         ids, covs = self._tracked(state, *self.truth.at(step - 1))
-        best, _ = self._decide(_DecisionState(step, at, covs), self.truth, ids, self.depth, mask, rng)
-        chosen = tuple(own.first_action(course) for own, course in zip(options, best, strict=True))
+        best, _ = self._decide(_DecisionState(step, current, covs), self.truth, ids, self.depth, mask, rng)
+        chosen = tuple(each.first_action(course) for each, course in zip(options, best, strict=True))
         notes = mask.notes if mask is not None else ()
-        return Plan(self.name, tuple(own.actions for own in options), chosen, (), {}, notes)
+        return Plan(self.name, tuple(each.actions for each in options), chosen, (), {}, notes)
 
     def _tracked(self, state: State, ids: Ints, states: Floats) -> tuple[Ints, tuple[Floats, ...]]:
         """Return the targets that the sensors can still affect, and their covariances in each density."""
@@ -137,36 +137,36 @@ class OraclePlanner:
             match_tracks(self.estimate, belief, state.step, states, self.cutoff)
             for belief in (state.fused, *(() if table.one_belief else state.local))
         ]
-        kept = held[0].found | table.rebirths
-        return ids[kept], tuple(own.covs[kept] for own in (held if table.one_belief else held[1:]))
+        retained = held[0].found | table.rebirths
+        return ids[retained], tuple(matched.covs[retained] for matched in (held if table.one_belief else held[1:]))
 
     def _decide(
         self, moment: _DecisionState, truth: Truth, ids: Ints, depth: int, mask: Mask | None, rng: np.random.Generator
     ) -> tuple[tuple[int, ...], float]:
         """Return the best joint action, and its cost together with the decisions after it."""
-        last = next((own for own in self.schedule.decision_steps if own > moment.step), len(self.schedule.times))
+        last = next((step for step in self.schedule.decision_steps if step > moment.step), len(self.schedule.times))
         options = options_of(self.sensors, moment.poses, self.settings)
         courses, scans = self._courses(moment, options, last)
         stretch = self._stretch(moment.step, last, courses, scans, truth, ids)
-        known: dict[tuple[int, ...], float] = {}
+        cost_of: dict[tuple[int, ...], float] = {}
 
         def evaluate(actions: Ints) -> Floats:
             costs = stretch.follow(moment.covs, actions)[0]
-            known.update(zip(map(tuple, actions.tolist()), costs.tolist(), strict=True))
+            cost_of.update(zip(map(tuple, actions.tolist()), costs.tolist(), strict=True))
             return -costs
 
         first = (0,) * len(self.sensors)
         first = first if mask is None else nearest_feasible(mask, first)
-        problem = JointProblem(tuple(len(own.courses) for own in options), evaluate, lambda: first, mask)
+        problem = JointProblem(tuple(len(each.courses) for each in options), evaluate, lambda: first, mask)
         best = self.search.search(problem, rng=rng)
         if depth == 1 or last >= len(self.schedule.times):
-            return best, known[best]
+            return best, cost_of[best]
         totals, stay = {}, np.isin(ids, truth.at(last - 1)[0])
-        for joint in sorted(known, key=lambda joint: (known[joint], joint))[: self.beam_width]:
-            ends = np.stack([own[course, -1] for own, course in zip(courses, joint, strict=True)])
-            covs = tuple(own[0][stay] for own in stretch.follow(moment.covs, np.array([joint]))[1])
+        for joint in sorted(cost_of, key=lambda joint: (cost_of[joint], joint))[: self.beam_width]:
+            ends = np.stack([poses[course, -1] for poses, course in zip(courses, joint, strict=True)])
+            covs = tuple(cov[0][stay] for cov in stretch.follow(moment.covs, np.array([joint]))[1])
             later = self._decide(_DecisionState(last, ends, covs), truth, ids[stay], depth - 1, None, rng)
-            totals[joint] = known[joint] + later[1]
+            totals[joint] = cost_of[joint] + later[1]
         best = min(totals, key=lambda joint: (totals[joint], joint))
         return best, totals[best]
 
@@ -178,13 +178,13 @@ class OraclePlanner:
         Per sensor: (num_courses, num_scans, pose_dim) poses, and (num_courses, num_scans) whether it scans.
         """
         times, table = self.schedule.times, self.schedule.scans_at
-        waits, found, scans = times[moment.step : last] - times[moment.step - 1], [], []
+        waits, courses, scans = times[moment.step : last] - times[moment.step - 1], [], []
         for s, (sensor, own) in enumerate(zip(self.sensors, options, strict=True)):
             actions = own.actions.values[[own.first_action(course) for course in range(len(own.courses))]]
             of_platform = f"sensors[{s}].platform", sensor.platform, moment.poses[s], actions, waits
-            found.append(courses_of(*of_platform))
+            courses.append(courses_of(*of_platform))
             scans.append(scans_of(*of_platform) & (True if table is None else table[s, moment.step : last]))
-        return tuple(found), tuple(scans)
+        return tuple(courses), tuple(scans)
 
     def _stretch(
         self,
@@ -204,20 +204,20 @@ class OraclePlanner:
         dim, num = motion.state_dim, len(ids)
         states, alive = np.full((last - first + 1, num, dim), np.nan), np.zeros((last - first + 1, num))
         for k in range(len(states)):
-            now, own = truth.at(first - 1 + k)
-            _, places, rows = np.intersect1d(ids, now, assume_unique=True, return_indices=True)
+            present, present_states = truth.at(first - 1 + k)
+            _, columns, rows = np.intersect1d(ids, present, assume_unique=True, return_indices=True)
             states[k] = states[max(k - 1, 0)]
-            states[k, places], alive[k, places] = own[rows], 1.0
+            states[k, columns], alive[k, columns] = present_states[rows], 1.0
         steps = list(zip(states[:-1], np.diff(times[first - 1 : last]).tolist(), strict=True))
         truths = []
-        for sensor, own, when in zip(self.sensors, courses, scans, strict=True):
-            information = np.zeros((*own.shape[:2], num, dim, dim))
-            for course, k in np.argwhere(when).tolist():
-                information[course, k] = scan_information(sensor.filter.sensor, states[k + 1], own[course, k])
+        for sensor, poses, scanned in zip(self.sensors, courses, scans, strict=True):
+            information = np.zeros((*poses.shape[:2], num, dim, dim))
+            for course, k in np.argwhere(scanned).tolist():
+                information[course, k] = scan_information(sensor.filter.sensor, states[k + 1], poses[course, k])
             truths.append(information)
         return CovarianceRecursion(
-            np.array([transition_jacobians(motion, own, dt) for own, dt in steps]).reshape(len(steps), num, dim, dim),
-            np.array([motion.noise_covs(own, dt) for own, dt in steps]).reshape(len(steps), num, dim, dim),
+            np.array([transition_jacobians(motion, x, dt) for x, dt in steps]).reshape(len(steps), num, dim, dim),
+            np.array([motion.noise_covs(x, dt) for x, dt in steps]).reshape(len(steps), num, dim, dim),
             alive[1:],
             tuple(truths),
             table.powers,

@@ -82,7 +82,7 @@ class OracleFilter(_Reference):
         if states.shape[1] != dim:
             raise InputError(f"truth: expected states of {dim} numbers, as of the filters; got {states.shape[1]}")
         wide = _LOST**2 * np.eye(dim)
-        covs = np.array([self._covs.get(own, wide) for own in ids.tolist()]).reshape(-1, dim, dim)
+        covs = np.array([self._covs.get(target, wide) for target in ids.tolist()]).reshape(-1, dim, dim)
         moved = transition_jacobians(motion, states, dt).reshape(-1, dim, dim)
         informations = np.linalg.inv(moved @ covs @ moved.swapaxes(1, 2) + motion.noise_covs(states, dt))
         for sensor, scan, pose in zip(self.sensors, scans, poses, strict=True):
@@ -92,7 +92,7 @@ class OracleFilter(_Reference):
         covs = 0.5 * (covs + covs.swapaxes(1, 2))
         self._covs = dict(zip(ids.tolist(), covs, strict=True))
         errors = np.linalg.cholesky(covs) @ rng.standard_normal((len(ids), dim, 1))
-        return self._believed([(1, own) for own in ids.tolist()], states + errors[:, :, 0], covs)
+        return self._believed([(1, target) for target in ids.tolist()], states + errors[:, :, 0], covs)
 
 
 @dataclass(slots=True, eq=False)
@@ -112,7 +112,7 @@ class LastScanFilter(_Reference):
     ) -> tuple[LMB, FilterInfo]:
         """Return a target at every measurement of the largest scan."""
         taken_scans = [(scan, s) for s, scan in enumerate(scans) if scan is not None]
-        scan, s = max(taken_scans, key=lambda each: len(each[0]), default=(np.empty((0, 2)), 0))
+        scan, s = max(taken_scans, key=lambda entry: len(entry[0]), default=(np.empty((0, 2)), 0))
         dim = self.targets.state_dim
         means = (
             self.sensors[s].measurement.states_at(np.asarray(scan), poses[s], dim) if len(scan) else np.empty((0, dim))

@@ -77,11 +77,11 @@ def _drawn(
     """Return one scan from checked arguments."""
     true = sensor if isinstance(sensor, TrueSensor) else TrueSensor(sensor)
     num, model = len(states), true.model
-    luck = rng.random(num)
-    states, at = (states, pose) if true.bias is NO_BIAS else _shown(true, states, pose)
-    measured = _noisy_measurements(model, states, at, rng.standard_normal((num, model.meas_dim)))
-    detected = _seen(model, _detected_at(true, states, at, measured), at, luck)
-    clutter = model.clutter.sample(at, model.measurement, state_dim=states.shape[1], rng=rng)
+    uniforms = rng.random(num)
+    states, true_pose = (states, pose) if true.bias is NO_BIAS else _shown(true, states, pose)
+    measured = _noisy_measurements(model, states, true_pose, rng.standard_normal((num, model.meas_dim)))
+    detected = _seen(model, _detected_at(true, states, true_pose, measured), true_pose, uniforms)
+    clutter = model.clutter.sample(true_pose, model.measurement, state_dim=states.shape[1], rng=rng)
     order = rng.random(num + len(clutter)).argsort()
     if true.bias is not NO_BIAS:
         measured, clutter = _biased(true, measured), _biased(true, clutter)
@@ -168,14 +168,14 @@ def _detected_at(sensor: TrueSensor, states: Floats, pose: Floats, measured: Flo
     """Return the states for the detection probability: the true ones, or with the measured positions."""
     if sensor.detection_of == "state":
         return states
-    moved = states.copy()
-    moved[:, :2] = sensor.model.measurement.positions(measured, pose)
-    return moved
+    measured_states = states.copy()
+    measured_states[:, :2] = sensor.model.measurement.positions(measured, pose)
+    return measured_states
 
 
-def _seen(sensor: SensorModel, states: Floats, pose: Floats, luck: Floats) -> Bools:
+def _seen(sensor: SensorModel, states: Floats, pose: Floats, uniforms: Floats) -> Bools:
     chances = numbers_at(sensor.detection.function, states, pose, sensor.detection.params)
-    detected, bad = seen_with(chances, luck)
+    detected, bad = seen_with(chances, uniforms)
     if bad >= 0:
         state, got = states[bad], chances[bad]
         raise ModelError(f"detection model at state {state}, pose {pose}: expected a probability; got {got}")

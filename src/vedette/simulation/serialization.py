@@ -66,9 +66,9 @@ def decode_run(
 
     Raises `InputError`, naming `place` and the file, for files that are missing, damaged or inconsistent.
     """
-    tables, spent = _tables(facts, files, place, timings)
+    tables, seconds = _tables(facts, files, place, timings)
     with _errors_naming(place):
-        record = record_of(facts, tables, spent)
+        record = record_of(facts, tables, seconds)
         record.check()
     return record
 
@@ -80,9 +80,9 @@ def decode_summary(
 
     Tables of targets and tracks are not read.
     """
-    tables, spent = _tables(facts, files, place, timings, SUMMARY_FILES)
+    tables, seconds = _tables(facts, files, place, timings, SUMMARY_FILES)
     with _errors_naming(place):
-        return summary_of(facts, tables, spent)
+        return summary_of(facts, tables, seconds)
 
 
 def _tables(

@@ -105,10 +105,10 @@ def check_version(manifest: Mapping[str, Any], session: Any, place: Path) -> Non
     if number == FORMAT_VERSION:
         return
     if number in LACKING:
-        cure = f"vedette upgrade {shlex.quote(str(place.parent))}"
+        command = f"vedette upgrade {shlex.quote(str(place.parent))}"
         raise InputError(
             f"{place}: expected format {FORMAT_VERSION}; got {number}, written by an earlier version of this program: "
-            f"`{cure}` brings it to this one"
+            f"`{command}` brings it to this one"
         )
     writer = session.get("versions") if isinstance(session, dict) else None
     writer = writer.get("vedette") if isinstance(writer, dict) else None

@@ -72,11 +72,11 @@ def true_sensors_of(given: Sequence[TrueSensor], known: Sequence[SensorModel]) -
         if not isinstance(true, TrueSensor):
             raise reject(f"true_sensors[{s}]", "a TrueSensor", true)
         for name in ("angular", "periods"):
-            wanted, own = (getattr(each.measurement, name).tolist() for each in (model, true.model))
-            if own != wanted:
+            of_filter, of_truth = (getattr(each.measurement, name).tolist() for each in (model, true.model))
+            if of_truth != of_filter:
                 words = {"angular": "angular flags"}.get(name, name)
-                expected = f"measurements of {len(wanted)} components with the {words} {wanted}, as the filter's"
-                raise reject(f"true_sensors[{s}]", expected, own)
+                expected = f"measurements of {len(of_filter)} components with the {words} {of_filter}, as the filter's"
+                raise reject(f"true_sensors[{s}]", expected, of_truth)
     return tuple(given)
 
 

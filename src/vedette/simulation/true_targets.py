@@ -88,7 +88,7 @@ class TrueTargetsPlanner:
         retained = held.found | _may_be_born(birth, step)
         places = np.concatenate([states[retained], held.false_means])
         # Labels (0, id) of targets, and then (1, number) of false estimates.
-        labels = [(0, own) for own in ids[retained].tolist()] + [(1, k) for k in range(len(held.false_means))]
+        labels = [(0, target) for target in ids[retained].tolist()] + [(1, k) for k in range(len(held.false_means))]
         densities: dict[int, Any] = {}
         for belief in (state.fused, *state.local):
             if id(belief) not in densities:
@@ -112,9 +112,9 @@ def match_tracks(estimate: Estimator, belief: Any, step: int, states: Floats, cu
     false[_assign(estimated.means, estimated.covs, states, cutoff, covs, matched)] = False
     if isinstance(belief, LabelledDensity) and not matched.all():
         named = {(step, index) for step, index in estimated.labels.tolist()}
-        others = [own for own in belief.targets() if own.label not in named]
+        others = [target for target in belief.targets() if target.label not in named]
         if others:
-            means, of_means = (np.array([getattr(own, name) for own in others]) for name in ("mean", "cov"))
+            means, of_means = (np.array([getattr(target, name) for target in others]) for name in ("mean", "cov"))
             _assign(means, of_means, states, cutoff, covs, matched)
     return TrackedTargets(covs, matched, estimated.means[false])
 

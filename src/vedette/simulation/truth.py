@@ -178,11 +178,11 @@ class ScriptedTargets:
         moves = (elapsed > 0.0) & noisy[:, None]
         normals[moves] = rng.standard_normal((np.count_nonzero(moves), self.motion.state_dim))
         state = np.array(first)
-        for scan, (since, there) in enumerate(zip(elapsed.T, alive.T, strict=True)):
-            for dt in set(since.tolist()) - {0.0}:
-                going = since == dt
-                state[going] = moved_states(self.motion, state[going], dt, normals[going, scan], noisy[going])
-            states[there, scan] = state[there]
+        for scan, (steps, is_alive) in enumerate(zip(elapsed.T, alive.T, strict=True)):
+            for dt in set(steps.tolist()) - {0.0}:
+                due = steps == dt
+                state[due] = moved_states(self.motion, state[due], dt, normals[due, scan], noisy[due])
+            states[is_alive, scan] = state[is_alive]
         return Truth.from_arrays(scans, alive, states)
 
 
@@ -193,9 +193,9 @@ def _elapsed(scans: Floats, starts: Floats, alive: Bools) -> Floats:
     """
     elapsed, since = np.zeros(alive.shape), starts.copy()
     for scan, time in enumerate(scans.tolist()):
-        moved = alive[:, scan] & (time - since > TIME_TOLERANCE)
-        elapsed[moved, scan] = time - since[moved]
-        since[moved] = time
+        due = alive[:, scan] & (time - since > TIME_TOLERANCE)
+        elapsed[due, scan] = time - since[due]
+        since[due] = time
     return elapsed
 
 
@@ -220,8 +220,8 @@ def check_moved(states: Floats, moved: Floats, dt: float) -> None:
     """Raise `ModelError` unless all propagated states (num, state_dim) are finite."""
     if not np.isfinite(moved).all():
         bad = np.isfinite(moved).all(axis=1).argmin()
-        place, got = states[bad], moved[bad]
-        raise ModelError(f"motion of a target at state {place}, dt {dt}: expected a finite state; got {got}")
+        state, got = states[bad], moved[bad]
+        raise ModelError(f"motion of a target at state {state}, dt {dt}: expected a finite state; got {got}")
 
 
 def semidefinite_factor(cov: Floats) -> Floats:

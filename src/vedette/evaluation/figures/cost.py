@@ -42,9 +42,9 @@ def cost_figure(seconds: Mapping[str, Mapping[str, NDArray[np.floating]]]) -> Fi
         offset = (index - (len(seconds) - 1) / 2.0) * 0.7 / max(len(seconds), 1)
         rows = [row for row, stage in enumerate(stages) if len(stage_seconds.get(stage, ()))]
         low, middle, high = np.array([_quantiles(stage_seconds[stages[row]]) for row in rows]).T * 1e3
-        places = np.array(rows) + offset
-        axes.hlines(places, low, high, color=shade, linewidth=1.2)
-        axes.plot(middle, places, linestyle="", marker=marker, markersize=4, color=shade, label=label)
+        heights = np.array(rows) + offset
+        axes.hlines(heights, low, high, color=shade, linewidth=1.2)
+        axes.plot(middle, heights, linestyle="", marker=marker, markersize=4, color=shade, label=label)
     axes.set_xscale("log")
     _label_times(axes)
     counts = [max(len(stage_seconds.get(stage, ())) for stage_seconds in seconds.values()) for stage in stages]

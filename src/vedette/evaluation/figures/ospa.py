@@ -190,8 +190,8 @@ def draw_ospa(axes: Axes, comparison: Comparison, part: str) -> None:
             _draw_band(axes, times, curve, distinct[index], shade)
     for interval in shared_intervals(means):
         mean = np.where(interval.shown, means[interval.members[0]], np.nan)
-        for place, index in enumerate(interval.members):
-            dashes = (-_DASH * place, (_DASH, _DASH * (len(interval.members) - 1)))
+        for position, index in enumerate(interval.members):
+            dashes = (-_DASH * position, (_DASH, _DASH * (len(interval.members) - 1)))
             axes.plot(times, mean, color=colour(index), linestyle=dashes, dash_capstyle="butt", label="_")
         if comparison.num_runs > 1:
             _draw_band(axes, times, curves[interval.members[0]], interval.shown, GREY)

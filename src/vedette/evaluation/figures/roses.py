@@ -105,13 +105,13 @@ def _headings(chosen: list[Choice], angle: str) -> Ints:
 
 def _draw_bars(axes: Any, chosen: list[Choice], shades: Sequence[str]) -> None:
     """Draw one bar for each sensor and chosen action, the most frequent of each sensor on top."""
-    place, ticks = 0, []
-    for shade, rows in zip(shades, zip(*chosen, strict=True), strict=False):
-        for row, count in Counter(rows).most_common(_MAX_BARS):
-            axes.barh(place, count / len(chosen), color=shade, height=0.8)
-            ticks.append(with_minus(describe_action(row)))
-            place += 1
-    axes.set_yticks(range(place), ticks, fontsize=5)
+    bar, ticks = 0, []
+    for shade, actions in zip(shades, zip(*chosen, strict=True), strict=False):
+        for action, count in Counter(actions).most_common(_MAX_BARS):
+            axes.barh(bar, count / len(chosen), color=shade, height=0.8)
+            ticks.append(with_minus(describe_action(action)))
+            bar += 1
+    axes.set_yticks(range(bar), ticks, fontsize=5)
     axes.set_axisbelow(True)
     axes.invert_yaxis()
     axes.set_xlim(0.0, 1.0)
@@ -121,12 +121,12 @@ def _draw_bars(axes: Any, chosen: list[Choice], shades: Sequence[str]) -> None:
 def _draw_rose(axes: Any, chosen: Ints, shades: Sequence[str]) -> None:
     centres, width = _sectors(chosen)
     share = width / len(shades) * 0.9
-    for place, shade in enumerate(shades):
-        counts = _shares(chosen[:, place], centres, width)
+    for index, shade in enumerate(shades):
+        counts = _shares(chosen[:, index], centres, width)
         # Bars of the sensors are side by side, counter-clockwise, so that equal choices of all stay visible.
-        places = centres + (place - (len(shades) - 1) / 2.0) * share
+        angles = centres + (index - (len(shades) - 1) / 2.0) * share
         shown = counts > 0.0
-        axes.bar(places[shown], np.sqrt(counts[shown]), width=share, color=shade)
+        axes.bar(angles[shown], np.sqrt(counts[shown]), width=share, color=shade)
     axes.set_thetagrids(range(0, 360, 90), ["0°", "90°", "180°", "270°"])
     axes.set_ylim(0.0, 1.0)
     axes.set_yticks(np.sqrt([0.1, 0.5]), ["10 %", "50 %"])

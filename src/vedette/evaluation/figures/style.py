@@ -174,7 +174,7 @@ def shown_decisions(number: int, max_shown: int = 6) -> tuple[int, ...]:
     """Return indices of at most `max_shown` of `number` decisions, evenly spread, with the first and the last."""
     if number <= max_shown:
         return tuple(range(number))
-    return tuple(round(place * (number - 1) / (max_shown - 1)) for place in range(max_shown))
+    return tuple(round(index * (number - 1) / (max_shown - 1)) for index in range(max_shown))
 
 
 def line_style(index: int) -> Any:
@@ -251,10 +251,10 @@ def _save(figure: Figure, path: Path, name: str) -> Path:
     return path
 
 
-def _print(figure: Figure, to: Any, name: str) -> None:
+def _print(figure: Figure, file: Any, name: str) -> None:
     """Print with the canvas of a format: `Figure.savefig` would draw twice, the first time only for the layout."""
     canvas: Any = {"pdf": FigureCanvasPdf, "svg": FigureCanvasSVG, "png": FigureCanvasAgg}[name](figure)
     if name == "png":
-        canvas.print_png(to)
+        canvas.print_png(file)
     else:
-        getattr(canvas, f"print_{name}")(to, metadata=_WITHOUT_DATE[name])
+        getattr(canvas, f"print_{name}")(file, metadata=_WITHOUT_DATE[name])

@@ -179,8 +179,8 @@ def plot_extent(records: Sequence[RunRecord]) -> float:
 
 def _positions(record: RunRecord) -> Floats:
     """Return the positions, (n, 2) m, of targets (if unknown, of estimates) and sensors."""
-    known = record.truth.states[:, :2]
-    targets = [known] if len(known) else [estimate.means[:, :2] for estimate in record.estimates]
+    true_positions = record.truth.states[:, :2]
+    targets = [true_positions] if len(true_positions) else [estimate.means[:, :2] for estimate in record.estimates]
     return np.concatenate([*targets, record.poses[:, :, :2].reshape(-1, 2)])
 
 

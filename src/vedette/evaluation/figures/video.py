@@ -188,30 +188,30 @@ class _Drawing:
     def _draw_truth(self, step: int) -> None:
         truth = self._record.truth
         end = int(truth.offsets[step + 1])
-        ids, places = truth.ids[:end], truth.states[:end, :2] * self._scale
-        paths = [places[ids == target] for target in np.unique(ids)]
+        ids, positions = truth.ids[:end], truth.states[:end, :2] * self._scale
+        paths = [positions[ids == target] for target in np.unique(ids)]
         self._add(self._axes.add_collection(LineCollection(paths, colors=INK, linewidths=0.9, zorder=2)))
         ids, states = truth.at(step)
         style: dict[str, Any] = {"marker": "o", "color": INK, "markerfacecolor": "white", "markersize": 5}
         self._add(self._axes.plot(*(states[:, :2].T * self._scale), linestyle="", zorder=4, **style)[0])
 
     def _draw_estimates(self, step: int) -> None:
-        past = self._record.estimates[: step + 1]
-        points = np.concatenate([estimate.means[:, :2] for estimate in past]) * self._scale
-        shades = [self._shade(label) for estimate in past for label in estimate.labels.tolist()]
+        estimates = self._record.estimates[: step + 1]
+        points = np.concatenate([estimate.means[:, :2] for estimate in estimates]) * self._scale
+        shades = [self._shade(label) for estimate in estimates for label in estimate.labels.tolist()]
         if shades:
             self._add(
                 self._axes.scatter(points[:, 0], points[:, 1], s=2.5, c=shades, alpha=0.5, linewidths=0, zorder=3)
             )
-        current = past[-1]
+        current = estimates[-1]
         for label, mean, cov in zip(current.labels.tolist(), current.means, current.covs, strict=True):
-            shade, place = self._shade(label), (float(mean[0]) * self._scale, float(mean[1]) * self._scale)
+            shade, position = self._shade(label), (float(mean[0]) * self._scale, float(mean[1]) * self._scale)
             variances, axes = np.linalg.eigh(cov[:2, :2])
             width, height = 2.0 * _SIGMAS * np.sqrt(np.maximum(variances, 0.0)) * self._scale
             angle = float(np.degrees(np.arctan2(axes[1, 0], axes[0, 0])))
-            ellipse = Ellipse(place, width, height, angle=angle, color=shade, fill=False, linewidth=0.8, zorder=5)
+            ellipse = Ellipse(position, width, height, angle=angle, color=shade, fill=False, linewidth=0.8, zorder=5)
             self._add(self._axes.add_patch(ellipse))
-            self._add(self._axes.plot(*place, marker=".", color=shade, markersize=5, zorder=6)[0])
+            self._add(self._axes.plot(*position, marker=".", color=shade, markersize=5, zorder=6)[0])
 
     def _draw_names(self, step: int) -> None:
         """Draw names of sensors, targets and estimates, in this order; a name that would cover another is left out."""
@@ -233,14 +233,14 @@ class _Drawing:
         if not names:
             return
         marks = np.concatenate([states[:, :2], current.means[:, :2], record.poses[step, :, :2]])
-        places = np.array([place for _, place, _ in names])
-        name_places = place_names([name for name, *_ in names], places, plot_bounds([record], self._scene), marks)
-        for (name, _, shade), place, (arguments, covers_name) in zip(
-            names, places * self._scale, name_places, strict=True
+        positions = np.array([position for _, position, _ in names])
+        name_places = place_names([name for name, *_ in names], positions, plot_bounds([record], self._scene), marks)
+        for (name, _, shade), position, (arguments, covers_name) in zip(
+            names, positions * self._scale, name_places, strict=True
         ):
             style: dict[str, Any] = {"textcoords": "offset points", "fontsize": 6, "color": shade, "zorder": 9}
             if not covers_name:
-                self._add(self._axes.annotate(name, (float(place[0]), float(place[1])), **arguments, **style))
+                self._add(self._axes.annotate(name, (float(position[0]), float(position[1])), **arguments, **style))
 
     def _shade(self, label: list[int]) -> str:
         return colour(self._places.get(tuple(label), 0))
@@ -248,15 +248,15 @@ class _Drawing:
     def _draw_sensors(self, step: int) -> None:
         record, model = self._record, self._scenario.model
         for s, (section, pose) in enumerate(zip(model.sensors, record.poses[step], strict=True)):
-            place = (float(pose[0]) * self._scale, float(pose[1]) * self._scale)
+            position = (float(pose[0]) * self._scale, float(pose[1]) * self._scale)
             field = self._scene.field(s, pose)
             if field is not None:
-                self._add(draw_field(self._axes, place, field, self._scale))
+                self._add(draw_field(self._axes, position, field, self._scale))
             path = record.poses[: step + 1, s, :2] * self._scale
             self._add(self._axes.plot(*path.T, color=GREY, linewidth=1.2, linestyle=(0, (2.5, 1)), zorder=3)[0])
             marker = SENSOR_MARKERS[s % len(SENSOR_MARKERS)]
             style: dict[str, Any] = {"marker": marker, "color": INK, "markerfacecolor": GREY, "markersize": 6}
-            self._add(self._axes.plot(*place, zorder=8, **style)[0])
+            self._add(self._axes.plot(*position, zorder=8, **style)[0])
             scan = self._scans[step][s] if self._scans else None
             if scan is not None and section.measurement.kind in PLANE_SHAPES:
                 self._draw_scan(scan, section.measurement.kind, pose)
@@ -269,16 +269,16 @@ class _Drawing:
         for is_clutter in (False, True):
             shown = positions[(scan.origins == CLUTTER) == is_clutter]
             style: dict[str, Any] = {"color": GREY if is_clutter else INK, "alpha": 0.7, "zorder": 2.5}
-            place = pose[:2] * self._scale
+            origin = pose[:2] * self._scale
             if PLANE_SHAPES[kind] == "ray":
-                ends = place + 2.0 * plot_extent([self._record]) * self._scale * np.column_stack(
+                ends = origin + 2.0 * plot_extent([self._record]) * self._scale * np.column_stack(
                     [np.cos(shown), np.sin(shown)]
                 )
-                rays = [np.stack([place, end]) for end in ends]
+                rays = [np.stack([origin, end]) for end in ends]
                 self._add(self._axes.add_collection(LineCollection(rays, linewidths=0.5, **style), autolim=False))
             elif PLANE_SHAPES[kind] == "circle":
                 for radius in shown[:, 0].tolist():
-                    circle = Circle((float(place[0]), float(place[1])), max(radius, 0.0), fill=False, lw=0.5, **style)
+                    circle = Circle((float(origin[0]), float(origin[1])), max(radius, 0.0), fill=False, lw=0.5, **style)
                     self._add(self._axes.add_patch(circle))
             else:
                 size = 2.5 if is_clutter else 4.0
@@ -296,4 +296,4 @@ def _available_scans(record: RunRecord, scenario: Scenario, trust: bool) -> Scan
 
 
 def _colour_indices(labels: Ints) -> dict[tuple[int, ...], int]:
-    return {tuple(label): place for place, label in enumerate(np.unique(labels, axis=0).tolist())}
+    return {tuple(label): index for index, label in enumerate(np.unique(labels, axis=0).tolist())}

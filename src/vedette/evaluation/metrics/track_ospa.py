@@ -130,10 +130,10 @@ def ospa2_of_run(truth: Truth, estimates: Sequence[Estimate], *, cutoff: float, 
 
 def _costs(first: TrackSet, second: TrackSet, cutoff: float) -> tuple[Floats, Bools]:
     """Return cut-off distances (0 if neither exists) and flags if either exists, (num_first, num_second, num_scans)."""
-    either = first.alive[:, None] | second.alive[None]
-    both = first.alive[:, None] & second.alive[None]
+    either_alive = first.alive[:, None] | second.alive[None]
+    both_alive = first.alive[:, None] & second.alive[None]
     distances = np.sqrt(((first.positions[:, None] - second.positions[None]) ** 2).sum(axis=3))
-    return np.where(both, np.minimum(distances, cutoff), cutoff) * either, either
+    return np.where(both_alive, np.minimum(distances, cutoff), cutoff) * either_alive, either_alive
 
 
 def _averages(costs: Floats, either: Bools) -> Floats:
