@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import contextlib
 import hashlib
-import sys
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 
@@ -13,15 +11,14 @@ import typer
 
 from vedette.cli.compiling import compiling
 from vedette.cli.completing import strategies
-from vedette.cli.errors import usage_error
+from vedette.cli.listening import Source, listen_to, parse_sources, print_answers
 from vedette.cli.options import Seed, Speed, Trust
-from vedette.cli.output import echo, emit_json, note
+from vedette.cli.output import emit_json, note
 from vedette.cli.running import CodeTrust, check_planner, compile_if_cold, interruptible
 from vedette.cli.scenario_files import note_assumptions, print_warnings
-from vedette.internal.extras import require_packages
 
 if TYPE_CHECKING:
-    from vedette.live import LineServer, LiveLoop, LiveState, PersistentLoop
+    from vedette.live import LiveLoop, LiveState, PersistentLoop
     from vedette.reports.live import LiveScreen
     from vedette.scenarios.from_recording import LiveScenario
 
@@ -121,7 +118,7 @@ def live(
 
     Reads one JSON line per scan; writes estimates, and plans when a decision is due.
     """
-    sources = _parse_sources(listen or ["stdin"], token)
+    sources = parse_sources(listen or ["stdin"], token)
     options = _LoopOptions(max_delay, max_lead, speed, planner, decide_every, planning_timeout, seed)
     live_scenario = _read_scenario(sensors, options, trust)
     loop = _build_loop(live_scenario, options)
@@ -198,7 +195,7 @@ def _open_storage(
 
 
 def _process(
-    persistent: PersistentLoop, screen: LiveScreen | None, sources: Sequence[_Source], token: str | None
+    persistent: PersistentLoop, screen: LiveScreen | None, sources: Sequence[Source], token: str | None
 ) -> None:
     """Answer the lines of the record again, then those that arrive."""
     import asyncio
@@ -206,93 +203,10 @@ def _process(
     try:
         with compiling():
             for answers in persistent.resume():
-                _print_answers(answers)
-            asyncio.run(_listen(persistent, screen, sources, token))
+                print_answers(answers)
+            asyncio.run(listen_to(persistent, screen, sources, token))
     finally:
         persistent.close()
-
-
-class _Source(NamedTuple):
-    """A source of lines: stdin, tcp or ws, with its address."""
-
-    kind: str
-    host: str = ""
-    port: int = 0
-
-
-def _parse_sources(addresses: Sequence[str], token: str | None) -> list[_Source]:
-    """Return the sources of lines; raise if an address needs a token or a package that is missing."""
-    from vedette.live.server import check_address
-
-    sources = [_parse_source(address) for address in addresses]
-    for source in sources:
-        if source.kind != "stdin":
-            check_address(source.host, token)
-    if any(source.kind == "ws" for source in sources):
-        require_packages("vedette live --listen ws://", "websockets", "jinja2", "matplotlib", "pyarrow")
-    return sources
-
-
-def _parse_source(listen: str) -> _Source:
-    if listen == "stdin":
-        return _Source(listen)
-    kind, _, address = listen.rpartition("://")
-    host, _, port = address.rstrip("/").rpartition(":")
-    if kind not in ("tcp", "ws") or not host or not port.isdecimal() or int(port) > 65535:
-        raise usage_error(f"expected stdin, tcp://HOST:PORT or ws://HOST:PORT; got {listen!r}", "--listen")
-    return _Source(kind, host.strip("[]"), int(port))
-
-
-def _print_answers(answers: Iterable[dict[str, Any]]) -> None:
-    from vedette.live import encode_line
-
-    for answer in answers:
-        echo(encode_line(answer).decode(), nl=False)
-
-
-async def _listen(
-    persistent: PersistentLoop, screen: LiveScreen | None, sources: Sequence[_Source], token: str | None
-) -> None:
-    """Process lines until standard input ends, or until Ctrl-C if there are clients; do not wait for them."""
-    import asyncio
-
-    from vedette.live import LineServer, iter_lines
-
-    def process(line: bytes) -> Iterable[dict[str, Any]]:
-        answers = persistent.process(line)
-        _print_answers(answers)
-        if screen is not None:
-            screen.note(answers)
-        return answers
-
-    line_server = LineServer(process, token, note)
-    async with contextlib.AsyncExitStack() as servers:
-        for source in sources:
-            if source.kind != "stdin":
-                servers.callback(await _start_server(source, line_server, screen))
-        if any(source.kind == "stdin" for source in sources):
-            async for line in iter_lines(sys.stdin.buffer):
-                await line_server.answer(line, None)
-        if any(source.kind != "stdin" for source in sources):
-            await asyncio.Event().wait()
-
-
-async def _start_server(source: _Source, line_server: LineServer, screen: LiveScreen | None) -> Callable[[], None]:
-    """Start a server of clients, print its address, and return the function that closes it."""
-    from vedette.live import TcpServer
-
-    server: Any
-    if source.kind == "ws" and screen is not None:
-        from vedette.live.web import WebServer
-
-        server = await WebServer(line_server, screen, source.host).listen(source.port)
-    else:
-        server = await TcpServer(line_server).listen(source.host, source.port)
-    host, port = server.sockets[0].getsockname()[:2]
-    address = f"[{host}]:{port}" if ":" in host else f"{host}:{port}"
-    note(f"listens on {source.kind}://{address}" + (f"; the page is http://{address}/" if source.kind == "ws" else ""))
-    close: Callable[[], None] = server.close
-    return close
 
 
 def _document(persistent: PersistentLoop) -> dict[str, Any]:
