@@ -45,6 +45,10 @@ def python(module: str, *arguments: str) -> list[str]:
     return [sys.executable, "-m", module, *arguments]
 
 
+# Files and folders whose words are checked.
+SPELLED = ("README.md", "CHANGELOG.md", "dev.py", "docs", "src", "tests", "benchmarks", "examples", "tools")
+
+
 def lane(purpose: str, name: str, *, by_default: bool = True, **environment: str) -> Stage:
     """The marked tests under another way of compiling, with a kernel cache of its own."""
     environment["VEDETTE_CACHE_DIR"] = str(BUILD / f"kernels-{name}")
@@ -76,6 +80,7 @@ STAGES = {
     "docs": Stage("the site of the documentation, without warnings", [sys.executable, "tools/docs.py"]),
     "format": Stage("the layout of the source", python("ruff", "format", "--check", "--output-format=concise", ".")),
     "prose": Stage("turns of phrase and lengths of guides", [sys.executable, "tools/prose.py"]),
+    "spelling": Stage("frequent misspellings", python("codespell_lib", *SPELLED)),
     "lint": Stage("likely mistakes", python("ruff", "check", "--output-format=concise", ".")),
     "imports": Stage(
         "which package may import which", [str(Path(sys.executable).with_name("lint-imports")), "--no-logo"]
