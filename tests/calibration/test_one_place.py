@@ -135,9 +135,8 @@ def test_groups_share_targets_directly_or_through_others() -> None:
     rows = [(s, track) for s, tracks in seen.items() for track in tracks for _ in range(3)] + [(5, 0), (5, 0)]
     sensors, tracks = np.array(rows).T
     num, none = len(rows), np.zeros(7, np.int64)
-    pairs = MatchedMeasurements(
-        np.arange(float(num)), sensors, tracks, *(np.zeros((num, size)) for size in (2, 2, 4)), none, none, none
-    )
+    measured, poses, states = np.zeros((num, 2)), np.zeros((num, 2)), np.zeros((num, 4))
+    pairs = MatchedMeasurements(np.arange(float(num)), sensors, tracks, measured, poses, states, none, none, none)
     assert groups_with_common_targets(pairs, 7) == [[0, 2, 3], [1, 4], [5], [6]]
 
 

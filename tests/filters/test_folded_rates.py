@@ -85,7 +85,7 @@ def test_a_range_rate_that_may_be_one_of_several_is_none(kind: Any, stds: Any, o
     cov = np.diag([16.0, 9.0, 25.0, 25.0]) if stds is STDS else np.diag([900.0, 900.0, 25.0, 25.0])
     prior = believed(kind, 0.6, [MEAN], [cov])
     scan = np.concatenate([measured(MEAN), [[2.0, 40.0, -3.0]]])
-    plain = {
+    plain: dict[str, Any] = {
         "measurement": models.bearing_range(),
         "noise": models.constant_noise(stds[:2]),
         "clutter": models.around_sensor(2.0, "bearing_range", radius=150.0),
