@@ -211,6 +211,19 @@ def test_filters_receive_the_time_between_scans(experiment: Experiment) -> None:
     assert (state.step, state.local, len(info.filters)) == (3, (state.fused,), 1)
 
 
+def test_only_what_is_fused_is_sent(experiment: Experiment) -> None:
+    tracker: Any = experiment.tracker
+    alone, sent = Distributed(tracker.filters[:1]), []
+    for each in (tracker, alone):
+        num = len(each.sensors)
+        rngs = [np.random.default_rng(s) for s in range(num)]
+        _, info = each.step(each.initial(), [[]] * num, experiment.poses[:num], 1.0, rngs=rngs)
+        sent.append(info.bytes_sent)
+    assert len(sent[0]) == 2
+    assert min(sent[0]) > 0
+    assert sent[1] == ()
+
+
 def test_feedback_gives_every_sensor_the_fused_belief(experiment: Experiment) -> None:
     tracker: Any = replace(experiment.tracker, feedback=True)  # type: ignore[type-var]
     scans, rngs = [np.array([[0.1, 500.0]])] * 2, [np.random.default_rng(0)] * 2
