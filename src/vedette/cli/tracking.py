@@ -15,12 +15,7 @@ from vedette.cli.errors import option_errors, usage_error
 from vedette.cli.options import BAD_ROWS, BadRows, Overwrite, ScansFile, SensorsFile, Speed, Trust
 from vedette.cli.output import bar, echo, emit_json, note
 from vedette.cli.run_summary import print_run
-from vedette.cli.running import (
-    CodeTrust,
-    end_stopped,
-    interruptible,
-    print_recording_warnings,
-)
+from vedette.cli.running import CodeTrust, end_stopped, interruptible, print_recording_warnings
 from vedette.cli.scenario_files import note_assumptions, print_warnings
 from vedette.internal.extras import without
 from vedette.internal.text import pluralise

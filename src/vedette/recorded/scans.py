@@ -46,15 +46,7 @@ from vedette.recorded.scan_times import (
     remove_biases,
     turned,
 )
-from vedette.recorded.tables import (
-    FARTHEST,
-    LATEST,
-    Table,
-    is_empty,
-    is_number,
-    number,
-    seconds,
-)
+from vedette.recorded.tables import FARTHEST, LATEST, Table, is_empty, is_number, number, seconds
 from vedette.recorded.turns import bearings_of, scans_of_turns
 from vedette.simulation.records import ScansFile
 
