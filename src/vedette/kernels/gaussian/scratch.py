@@ -55,7 +55,7 @@ def make_scratch(state_dim: int, meas_dim: int) -> Scratch:
 def wrap(value: float, period: float) -> float:
     """The same value in (-period / 2, period / 2]; period inf: unchanged."""
     half = 0.5 * period
-    if -half < value <= half:
+    if period == math.inf or not (value <= -half or value > half):  # NaN stays
         return value
     wrapped = value - period * math.floor((value + half) / period)
     return half if wrapped <= -half else wrapped
