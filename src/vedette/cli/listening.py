@@ -48,6 +48,7 @@ def _parse_source(address: str) -> Source:
 
 
 def print_answers(answers: Iterable[dict[str, Any]]) -> None:
+    """Print each answer as a line of JSON."""
     from vedette.live import encode_line
 
     for answer in answers:
