@@ -26,7 +26,7 @@ from vedette.kernels.base.types import Floats
 _NEARER = 3.0  # multiple of the estimated noise, in the next round
 _QUANTILE = 1.959964  # of the normal distribution, 97.5 %
 _COMPARED = ("clock", "x", "y")  # components that are relative to those of the first sensor
-_BY_MOTION = {  # biases of a sensor without another one at another place, and what a bias then is like
+_BY_MOTION = {  # bias that needs a second sensor at another place: effect that looks the same without one
     "bearing": "a rotation of all targets",
     "range": "another motion of the targets than assumed",
 }
@@ -96,7 +96,7 @@ def calibrate(
     guessed, pairs = _guess(problem, said, asked, progress)
     groups = groups_with_common_targets(pairs, len(problem.sites))
     apart = [s for group in groups if group != groups[0] or len(group) == 1 for s in group]
-    held = {i: _unknown(problem, i) for i in asked if i in _biases_by_motion(problem, pairs, groups)}
+    held = {i: _unknown(problem, i) for i in _biases_by_motion(problem, pairs, groups) if i in asked}
     free = [i for i in asked if i not in held]
     if not free:
         return Calibration(tuple(held[i] for i in asked), before, before, True, 0)

@@ -238,10 +238,10 @@ def _pose(given: Any, field: str, site: RecordedSensor) -> tuple[dict[str, float
 
 def _pose_stds(given: Any, field: str, site: RecordedSensor) -> Iterator[tuple[str, float]]:
     """Yield standard deviations of the pose as columns of a table: their names and values."""
-    fields = pose_stds_of(COMPONENTS[site.kind], site.kind in HEIGHT_DEPENDENT)
-    names = {{"heading": "heading_deg"}.get(each, each): each for each in fields}
     if given is None:
         return
+    fields = pose_stds_of(COMPONENTS[site.kind], site.kind in HEIGHT_DEPENDENT)
+    names = {{"heading": "heading_deg"}.get(each, each): each for each in fields}
     if not names:
         raise reject(field, f"none, as measurements of {shown(site.name)} do not depend on its pose", given)
     if not isinstance(given, dict) or not given or not set(given) <= set(names):

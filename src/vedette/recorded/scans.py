@@ -205,7 +205,7 @@ class _Rows(ScanColumns):
         own, signal = {name: value for name, value in accuracy.items() if not math.isnan(value)}, self.sites[s].signal
         names = COMPONENTS[self.sites[s].kind]
         missing = [name in GAPS and self._is_blank(i, name) for name in names]
-        stds = [own.get(f"{name}_std", 0.0) if not gap else 0.0 for name, gap in zip(names, missing, strict=True)]
+        stds = [own.get(f"{name}_std", 0.0) for name in names]
         ratio = signal.log_likelihood_ratio(own["snr"]) if signal is not None and "snr" in own else 0.0
         of_pose = PoseStds(**{name: own.get(f"own_{name}_std", 0.0) for name in PoseStds._fields})
         added = pose_noise(measured, names, pose, of_pose) if any(of_pose) else None
