@@ -10,7 +10,8 @@ import pytest
 from vedette import models
 from vedette.densities import FactoredGLMB, existence_probabilities
 from vedette.filters import FactoredGlmbFilter
-from vedette.kernels.base.types import FactoredGlmb, Glmb, Mixture, Tracks
+from vedette.kernels.base.types import FactoredGlmb, Glmb, Tracks
+from vedette.kernels.gaussian.components import components_of
 from vedette.kernels.labelled.established_labels import with_established_labels
 from vedette.kernels.labelled.splitting import choices_of
 
@@ -19,7 +20,7 @@ LABELS = np.array([[1, 0], [2, 0], [2, 1]])
 
 def glmb(hypotheses: dict[tuple[int, ...], float]) -> Glmb:
     """Of three labels with one track each. hypotheses: weights of sets of tracks."""
-    components = Mixture(np.zeros(3), np.arange(12.0).reshape(3, 4), np.tile(np.eye(4), (3, 1, 1)))
+    components = components_of(np.zeros(3), np.arange(12.0).reshape(3, 4), np.tile(np.eye(4), (3, 1, 1)))
     tracks = Tracks(LABELS, np.arange(4), components)
     sizes = [len(held) for held in hypotheses]
     members = np.array([track for held in hypotheses for track in held], np.int64)
@@ -71,7 +72,7 @@ def test_a_prediction_keeps_improbable_names() -> None:
     """A parallel update needs the same labels, one Gaussian each, in the prediction and in what sensors made of it."""
     pair = glmb({(0,): 0.992, (1,): 0.004, (): 0.004})
     own = pair.tracks.components
-    tracks = Tracks(LABELS[:2], np.arange(3), Mixture(np.zeros(2), own.means[:2], own.covs[:2]))
+    tracks = Tracks(LABELS[:2], np.arange(3), components_of(np.zeros(2), own.means[:2], own.covs[:2]))
     factor = np.array([0, 2]), pair.hyp_offsets, pair.hyp_tracks, pair.hyp_log_weights, np.array([0, 3])
     belief = FactoredGLMB.from_kernel(FactoredGlmb(tracks, *factor))
     targets = models.TargetModel(

@@ -146,12 +146,13 @@ def test_bad_requests_are_refused():
         sample_poisson(random_poisson(rng, 1), -1, rng=rng)
     with pytest.raises(InputError, match="index"):
         sample_glmb(GLMB.empty(2), 3, rng=rng).sample(3)
-    singular = unchecked(Poisson, np.array([5.0]), np.zeros((1, 2)), np.zeros((1, 2, 2)))
+    singular = unchecked(Poisson, np.array([5.0]), np.zeros((1, 2)), np.zeros((1, 2, 2)), np.empty((1, 0)))
     with pytest.raises(NumericalError, match="covs"):
         sample_poisson(singular, 3, rng=rng)
     for log_weight in (30.0, 1e3):
+        many = unchecked(Poisson, np.array([log_weight]), np.zeros((1, 2)), np.eye(2)[None], np.empty((1, 0)))
         with pytest.raises(InputError, match=r"density.expected_number: expected at most 1e\+09 targets in"):
-            sample_poisson(unchecked(Poisson, np.array([log_weight]), np.zeros((1, 2)), np.eye(2)[None]), 10, rng=rng)
+            sample_poisson(many, 10, rng=rng)
 
 
 @pytest.mark.parametrize(

@@ -25,6 +25,7 @@ def make_options(rows: list[list[tuple[int, float]]], num_measurements: int) -> 
         np.zeros(1),
         np.zeros((1, 1)),
         np.empty((0, 0, 0)),
+        np.empty((0, 0)),
         num_measurements,
     )
 

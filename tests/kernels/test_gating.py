@@ -9,6 +9,8 @@ import pytest
 
 from vedette.kernels.association.gating import near_measurements
 from vedette.kernels.association.predicted import Rows, make_rows
+from vedette.kernels.gaussian.components import components_of
+from vedette.models.arguments import no_gaussians
 from vedette.models.measurement import wrap_angles
 
 GATE = 9.0
@@ -17,7 +19,7 @@ GATE = 9.0
 def rows_of(rng: np.random.Generator, num: int, spread: list[float], angular: list[bool], tightness: float) -> Rows:
     """Rows of one to three components that expect measurements spread as these are."""
     sizes = rng.integers(1, 4, num)
-    rows = make_rows(num, int(sizes.sum()), 4, len(spread))
+    rows = make_rows(num, int(sizes.sum()), components_of(np.empty(0), *no_gaussians(4)), len(spread))
     rows.offsets[:] = np.concatenate([[0], np.cumsum(sizes)])
     places = rng.uniform(-1.0, 1.0, (num, len(spread)))
     for c, row in enumerate(np.repeat(np.arange(num), sizes)):

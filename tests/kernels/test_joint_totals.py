@@ -34,6 +34,7 @@ def _as_options(offsets: list[int], columns: list[int], log_weights: list[float]
         none,
         none.reshape(0, 2),
         none.reshape(0, 5, 4),
+        none.reshape(0, 0),
         num_measurements,
     )
 

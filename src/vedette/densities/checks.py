@@ -159,10 +159,17 @@ def check_covariances(field: str, covs: Floats, error: type[VedetteError] = Nume
         raise error(message) from None
 
 
-def check_components(
-    field: str, log_weights: Any, means: Any, covs: Any, error: type[VedetteError] = NumericalError
-) -> None:
-    """Raise unless the arrays are weights, means and covariances of Gaussians; arguments as in `check_mixtures`."""
+def no_classes() -> Floats:
+    """Return the class probabilities of components without classes; a container gives them their length."""
+    return np.empty((0, 0))
+
+
+def check_components(field: str, density: Any, error: type[VedetteError] = NumericalError) -> None:
+    """Raise unless a density's arrays are weights, moments and class probabilities of components.
+
+    Arguments as in `check_mixtures`.
+    """
+    log_weights, means, covs, classes = density.log_weights, density.means, density.covs, density.log_class_probs
     check_array(f"{field}means", means, np.float64, (None, None))
     num_components, dim = means.shape
     if dim == 0:
@@ -172,24 +179,23 @@ def check_components(
     check_log_weights(f"{field}log_weights", log_weights, error)
     check_finite(f"{field}means", means, error)
     check_covariances(f"{field}covs", covs, error)
+    check_array(f"{field}log_class_probs", classes, np.float64, (num_components, None))
+    if classes.size:
+        name, flat = f"{field}log_class_probs", classes.reshape(-1)
+        check_log_weights(name, flat, error)
+        check_normalised(name, flat, np.arange(num_components + 1) * classes.shape[1], error)
 
 
 def check_mixtures(
-    field: str,
-    offsets: Any,
-    log_weights: Any,
-    means: Any,
-    covs: Any,
-    count: int,
-    error: type[VedetteError] = NumericalError,
+    field: str, density: Any, offsets: Any, count: int, error: type[VedetteError] = NumericalError
 ) -> None:
-    """Raise unless the arrays are `count` Gaussian mixtures, flat with offsets, each a probability density.
+    """Raise unless a density's components are `count` mixtures, flat with offsets, each a probability density.
 
     field: prefix of the names of the arrays. `InputError` for faults of form, `error` for faults of value.
     """
-    check_components(field, log_weights, means, covs, error)
-    check_offsets(f"{field}offsets", offsets, count, len(log_weights), empty_allowed=False)
-    check_normalised(f"{field}log_weights", log_weights, offsets, error)
+    check_components(field, density, error)
+    check_offsets(f"{field}offsets", offsets, count, len(density.log_weights), empty_allowed=False)
+    check_normalised(f"{field}log_weights", density.log_weights, offsets, error)
 
 
 def label_step_up(labels: Ints) -> Bools:

@@ -35,6 +35,8 @@ class Container(SummaryRepr):
         for name in self.__match_args__:  # type: ignore[attr-defined]
             value = getattr(self, name)
             if type(value) is np.ndarray:
+                if name == "log_class_probs" and value.shape[1:] == (0,):  # without classes
+                    value = np.empty((len(self.log_weights), 0))  # type: ignore[attr-defined]
                 object.__setattr__(self, name, _held(np.array(value, order="C")))
 
     def with_fields(self, **changed: Any) -> Self:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any, Protocol
 
 import numpy as np
@@ -17,7 +17,7 @@ from vedette.densities.inspection import Target, Targets
 from vedette.densities.labelled import LMB, LabelledDensity
 from vedette.densities.multi_bernoulli import MultiBernoulli
 from vedette.densities.statistics import cardinality_distribution, check_labelled
-from vedette.densities.tracks import TrackTable, gaussian_tracks, heaviest_components
+from vedette.densities.tracks import TrackTable, gaussian_tracks, heaviest_components, mean_class_probs, take_tracks
 from vedette.densities.unlabelled import IidCluster, Poisson
 from vedette.errors import InputError, NumericalError, VedetteError
 from vedette.internal.representation import TabularRepr
@@ -42,12 +42,19 @@ class Estimate(TabularRepr):
         means: (num_targets, state_dim) estimated states.
         covs: (num_targets, state_dim, state_dim) their covariances.
         existence: (num_targets,) probability that the label's target exists, over the whole density.
+        class_probs: (num_targets, num_classes) probability of each class of target, which sum to 1, in the order of
+            `BirthModel.class_probs`; without columns if targets have no classes.
     """
 
     labels: Ints
     means: Floats
     covs: Floats
     existence: Floats
+    class_probs: Floats = field(default_factory=checks.no_classes)
+
+    def __post_init__(self) -> None:
+        if self.class_probs.size == 0:
+            object.__setattr__(self, "class_probs", np.empty((len(self.labels), self.class_probs.shape[1])))
 
     @property
     def num_targets(self) -> int:
@@ -98,8 +105,10 @@ class Estimate(TabularRepr):
             raise InputError(f"labels: expected distinct labels in increasing order; got {self.labels.tolist()}")
         checks.check_finite("means", self.means, error)
         checks.check_covariances("covs", self.covs, error)
-        if not np.all((self.existence >= 0.0) & (self.existence <= 1.0)):
-            raise error(f"existence: expected probabilities; got {self.existence.tolist()}")
+        checks.check_array("class_probs", self.class_probs, np.float64, (self.num_targets, None))
+        for name, values in (("existence", self.existence), ("class_probs", self.class_probs)):
+            if not np.all((values >= 0.0) & (values <= 1.0)):
+                raise error(f"{name}: expected probabilities; got {values.tolist()}")
 
 
 class Estimator(Protocol):
@@ -174,7 +183,8 @@ def marginal_estimate(density: LabelledDensity, threshold: float = 0.5) -> Estim
 def _peaks(tracks: TrackTable, chosen: Ints, existence: Floats) -> Estimate:
     """Return the estimate at the heaviest component of each chosen track."""
     heaviest = heaviest_components(tracks.log_weights, tracks.offsets, chosen)
-    return Estimate(tracks.labels[chosen], tracks.means[heaviest], tracks.covs[heaviest], existence)
+    classes = np.exp(mean_class_probs(take_tracks(tracks, chosen))) if tracks.num_classes else checks.no_classes()
+    return Estimate(tracks.labels[chosen], tracks.means[heaviest], tracks.covs[heaviest], existence, classes)
 
 
 def at_dominant_components(density: LMB) -> LMB:
@@ -187,7 +197,8 @@ def at_dominant_components(density: LMB) -> LMB:
     if len(tracks.log_weights) == num:
         return density
     peaks = heaviest_components(tracks.log_weights, tracks.offsets, np.arange(num))
-    return density.with_fields(tracks=gaussian_tracks(tracks.labels, tracks.means[peaks], tracks.covs[peaks]))
+    columns = tracks.means, tracks.covs, tracks.log_class_probs
+    return density.with_fields(tracks=gaussian_tracks(tracks.labels, *(column[peaks] for column in columns)))
 
 
 def unlabelled_estimate(density: Poisson | IidCluster | MultiBernoulli, step: int) -> Estimate:
@@ -213,7 +224,8 @@ def unlabelled_estimate(density: Poisson | IidCluster | MultiBernoulli, step: in
     else:
         raise InputError(f"density: expected one without labels; got {type(density).__name__}")
     labels = np.column_stack([np.full(len(components), step), np.arange(len(components))]).astype(np.int64)
-    return Estimate(labels, density.means[components], density.covs[components], existence)
+    classes = np.exp(density.log_class_probs[components])
+    return Estimate(labels, density.means[components], density.covs[components], existence, classes)
 
 
 def _by_units(weights: Floats, number: int) -> tuple[Ints, Floats]:
@@ -242,6 +254,7 @@ class TrackHistory(TabularRepr):
         means: (num, state_dim).
         covs: (num, state_dim, state_dim).
         existence: (num,).
+        class_probs: (num, num_classes), see `Estimate`.
     """
 
     label: tuple[int, int]
@@ -250,6 +263,7 @@ class TrackHistory(TabularRepr):
     means: Floats
     covs: Floats
     existence: Floats
+    class_probs: Floats = field(default_factory=checks.no_classes)
 
     def to_table(self) -> dict[str, list[Any]]:
         """Return a table by columns, with one row per scan: `step`, `time_s`, and those of the table of a density."""
@@ -281,6 +295,7 @@ def track_histories(estimates: Sequence[Estimate], times: Floats) -> tuple[Track
                 np.stack([estimates[scan].means[target] for scan, target in seen]),
                 np.stack([estimates[scan].covs[target] for scan, target in seen]),
                 np.array([estimates[scan].existence[target] for scan, target in seen]),
+                np.stack([estimates[scan].class_probs[target] for scan, target in seen]),
             )
         )
     return tuple(histories)

@@ -129,12 +129,11 @@ class FactoredGLMB(Hypotheses):
         return unchecked(cls, TrackTable.from_kernel(density.tracks), *density[1:], undetected)
 
     @classmethod
-    def empty(cls, state_dim: int) -> FactoredGLMB:
+    def empty(cls, state_dim: int, num_classes: int = 0) -> FactoredGLMB:
         """Return the density that is certain of no target, without factors."""
         zero, none = np.zeros(1, np.int64), np.empty(0, np.int64)
-        return unchecked(
-            cls, TrackTable.empty(state_dim), zero, zero.copy(), none, np.empty(0), np.zeros(1, np.int64), None
-        )
+        tracks = TrackTable.empty(state_dim, num_classes)
+        return unchecked(cls, tracks, zero, zero.copy(), none, np.empty(0), np.zeros(1, np.int64), None)
 
     @classmethod
     def from_factors(cls, factors: Sequence[GLMB], state_dim: int) -> FactoredGLMB:
@@ -169,9 +168,10 @@ class FactoredGLMB(Hypotheses):
 
         state_dim: of all densities. Raises `InputError` for a label in two of them.
         """
+        num_classes = max((part.num_classes for part in parts), default=0)
         parts = [part for part in parts if part.num_factors > 0]
         if len(parts) < 2:
-            return parts[0] if parts else cls.empty(state_dim)
+            return parts[0] if parts else cls.empty(state_dim, num_classes)
         stack = stack_glmbs([part.as_hypotheses() for part in parts])
         made: FactoredGLMB = unchecked(
             cls,

@@ -11,6 +11,7 @@ from typing import Any, TypeAlias, cast
 
 import numpy as np
 
+from vedette.densities.checks import no_classes
 from vedette.densities.factored import FactoredGLMB
 from vedette.densities.glmb import GLMB
 from vedette.densities.labelled import LMB, LabelledDensity
@@ -37,7 +38,7 @@ _KINDS: dict[str, type[Density]] = {
     "multi_bernoulli": MultiBernoulli,
 }
 _UNDETECTED = "undetected"
-_OPTIONAL = {f"tracks.{field.name}" for field in fields(TrackTable) if field.default is None}
+_SOURCES, _CLASSES = "tracks.sources", "log_class_probs"  # are left out if there are none
 
 
 def save_density(path: str | os.PathLike[str], density: Density) -> None:
@@ -52,7 +53,9 @@ def save_density(path: str | os.PathLike[str], density: Density) -> None:
     arrays |= {name: array for name in _names(type(density)) if (array := attrgetter(name)(density)) is not None}
     if isinstance(density, FactoredGLMB) and density.undetected is not None:
         arrays |= _arrays_of_undetected(density.undetected)
-    write_file(Path(path), lambda file: np.savez(file, **arrays))
+    none = [name for name in arrays if name.endswith(_CLASSES) and arrays[name].shape[1] == 0]
+    given = {name: array for name, array in arrays.items() if name not in none}
+    write_file(Path(path), lambda file: np.savez(file, **given))
 
 
 def load_density(path: str | os.PathLike[str]) -> Density:
@@ -100,7 +103,8 @@ def _names(container: type[Any]) -> list[str]:
 
 def _build(kind: str, arrays: Mapping[str, Any]) -> Density:
     container: Any = _KINDS[kind]
-    own: list[Any] = [arrays.get(name) if name in _OPTIONAL else arrays[name] for name in _names(container)]
+    arrays = {f"{part}{_CLASSES}": no_classes() for part in ("", "tracks.", f"{_UNDETECTED}.")} | dict(arrays)
+    own: list[Any] = [arrays.get(name) if name == _SOURCES else arrays[name] for name in _names(container)]
     if not issubclass(container, LabelledDensity):
         return cast(Density, container(*own))
     num = len(fields(TrackTable))

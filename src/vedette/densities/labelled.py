@@ -53,6 +53,11 @@ class LabelledDensity(MultiTarget):
         return int(self.tracks.means.shape[1])
 
     @property
+    def num_classes(self) -> int:
+        """Number of classes of targets; 0 if they have none."""
+        return self.tracks.num_classes
+
+    @property
     @abstractmethod
     def is_marginalised(self) -> bool:
         """True if every label set occurs once in its factor."""
@@ -243,9 +248,9 @@ class LMB(LabelledDensity):
         return unchecked(cls, TrackTable.from_kernel(lmb.tracks), lmb.existence_logit)
 
     @classmethod
-    def empty(cls, state_dim: int) -> LMB:
+    def empty(cls, state_dim: int, num_classes: int = 0) -> LMB:
         """Return the density that is certain of no target."""
-        return unchecked(cls, TrackTable.empty(state_dim), np.empty(0))
+        return unchecked(cls, TrackTable.empty(state_dim, num_classes), np.empty(0))
 
     @classmethod
     def from_bernoullis(cls, labels: Any, existence: Any, means: Any, covs: Any) -> LMB:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any, ClassVar
 
 import numpy as np
@@ -33,6 +33,7 @@ class MultiBernoulli(Unlabelled):
         log_weights: (num_components,) log mixture weights, normalised within each Bernoulli.
         means: (num_components, state_dim).
         covs: (num_components, state_dim, state_dim), symmetric positive definite.
+        log_class_probs: (num_components, num_classes) log probability of each class; 0 classes if targets have none.
 
     The arrays are copied, checked once at creation, and read-only afterwards.
 
@@ -45,6 +46,7 @@ class MultiBernoulli(Unlabelled):
     log_weights: Floats
     means: Floats
     covs: Floats
+    log_class_probs: Floats = field(default_factory=checks.no_classes)
     _weight: ClassVar[str] = "existence"
 
     def targets(self) -> Iterator[Target]:
@@ -88,9 +90,10 @@ class MultiBernoulli(Unlabelled):
         return unchecked(cls, lmb.existence_logit, lmb.tracks.offsets, *lmb.tracks.components)
 
     @classmethod
-    def empty(cls, state_dim: int) -> MultiBernoulli:
+    def empty(cls, state_dim: int, num_classes: int = 0) -> MultiBernoulli:
         """Return the density that is certain of no target."""
-        return cls(np.empty(0), np.zeros(1, np.int64), np.empty(0), *no_gaussians(state_dim))
+        none, classes = no_gaussians(state_dim), np.empty((0, num_classes))
+        return cls(np.empty(0), np.zeros(1, np.int64), np.empty(0), *none, classes)
 
     @classmethod
     def from_gaussians(cls, existence: Any, means: Any, covs: Any) -> MultiBernoulli:
@@ -112,5 +115,5 @@ class MultiBernoulli(Unlabelled):
         """
         checks.check_array("existence_logit", self.existence_logit, np.float64, (None,))
         num = self.num_bernoullis
-        checks.check_mixtures("", self.offsets, self.log_weights, self.means, self.covs, num, error)
+        checks.check_mixtures("", self, self.offsets, num, error)
         checks.check_logits("existence_logit", self.existence_logit, error)

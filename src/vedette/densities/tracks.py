@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from itertools import pairwise
 from operator import attrgetter
 from typing import Any
@@ -36,6 +36,7 @@ class TrackTable(Container):
         log_weights: (num_components,) log mixture weights, normalised within each track.
         means: (num_components, state_dim).
         covs: (num_components, state_dim, state_dim), symmetric positive definite.
+        log_class_probs: (num_components, num_classes) log probability of each class; 0 classes if targets have none.
         sources: (num_tracks, 2) origin of each track in a `DeltaGlmbFilter`: its track in the previous belief, -1 if it
             was born; and the row of its measurement in the scan, -1 if it was missed, -2 if there was no scan (a
             prediction). None for tracks made of several, or by another filter, and if the origin is unknown.
@@ -51,6 +52,7 @@ class TrackTable(Container):
     log_weights: Floats
     means: Floats
     covs: Floats
+    log_class_probs: Floats = field(default_factory=checks.no_classes)
     sources: Ints | None = None
 
     def __post_init__(self) -> None:
@@ -72,6 +74,11 @@ class TrackTable(Container):
         return int(self.means.shape[1])
 
     @property
+    def num_classes(self) -> int:
+        """Number of classes of targets; 0 if they have none."""
+        return int(self.log_class_probs.shape[1])
+
+    @property
     def measurements(self) -> Ints | None:
         """Measurements in `sources`, shape (num_tracks,); None if they are unknown or there was no scan."""
         return None if self.sources is None or (self.sources[:, 1] == UNSCANNED).any() else self.sources[:, 1]
@@ -87,10 +94,11 @@ class TrackTable(Container):
         return unchecked(cls, tracks.labels, tracks.offsets, *tracks.components, sources)
 
     @classmethod
-    def empty(cls, state_dim: int) -> TrackTable:
+    def empty(cls, state_dim: int, num_classes: int = 0) -> TrackTable:
         """Return a table without tracks. Raises `InputError` for an invalid state dimension."""
         labels, offsets = np.empty((0, 2), np.int64), np.zeros(1, np.int64)
-        return cls.from_kernel(kt.Tracks(labels, offsets, components_of(np.empty(0), *no_gaussians(state_dim))))
+        none = components_of(np.empty(0), *no_gaussians(state_dim), np.empty((0, num_classes)))
+        return cls.from_kernel(kt.Tracks(labels, offsets, none))
 
     @classmethod
     def from_gaussians(cls, labels: Any, means: Any, covs: Any) -> TrackTable:
@@ -130,7 +138,7 @@ class TrackTable(Container):
         that are not symmetric positive definite.
         """
         checks.check_array("tracks.labels", self.labels, np.int64, (None, 2))
-        checks.check_mixtures("tracks.", self.offsets, self.log_weights, self.means, self.covs, self.num_tracks, error)
+        checks.check_mixtures("tracks.", self, self.offsets, self.num_tracks, error)
         if self.sources is not None:
             checks.check_sources("tracks.sources", self.sources, self.num_tracks)
 
@@ -171,10 +179,11 @@ def places_of(labels: Ints, table: Ints) -> Ints:
     return np.array([place.get(tuple(label), -1) for label in labels.tolist()], np.int64)
 
 
-def gaussian_tracks(labels: Ints, means: Floats, covs: Floats) -> TrackTable:
+def gaussian_tracks(labels: Ints, means: Floats, covs: Floats, log_class_probs: Floats | None = None) -> TrackTable:
     """Return `TrackTable.from_gaussians` of internal arrays, without copies and checks."""
     num = len(labels)
-    return TrackTable.from_kernel(kt.Tracks(labels, np.arange(num + 1), components_of(np.zeros(num), means, covs)))
+    components = components_of(np.zeros(num), means, covs, log_class_probs)
+    return TrackTable.from_kernel(kt.Tracks(labels, np.arange(num + 1), components))
 
 
 def place_labels(tables: Sequence[Ints]) -> tuple[Ints, Ints]:
@@ -193,7 +202,7 @@ def single_gaussians(tracks: TrackTable) -> TrackTable:
     """Return the tracks with each mixture replaced by one Gaussian of its moments."""
     if len(tracks.log_weights) == tracks.num_tracks:
         return tracks
-    return gaussian_tracks(tracks.labels, *track_moments(tracks))
+    return gaussian_tracks(tracks.labels, *track_moments(tracks), mean_class_probs(tracks))
 
 
 def mixture_moments(log_weights: Floats, means: Floats, covs: Floats) -> tuple[Floats, Floats]:
@@ -207,6 +216,15 @@ def mixture_moments(log_weights: Floats, means: Floats, covs: Floats) -> tuple[F
         raise InputError("log_weights: expected a mixture of positive weight; got none")
     mean, cov = run_moments(np.exp(log_weights - log_total), means, covs, offsets)
     return mean[0], cov[0]
+
+
+def mean_class_probs(tracks: TrackTable) -> Floats:
+    """Return the log probability of each class of every track, shape (num_tracks, num_classes)."""
+    if len(tracks.log_weights) == tracks.num_tracks or tracks.num_classes == 0:
+        return tracks.log_class_probs[: tracks.num_tracks].copy()
+    probs = np.exp(tracks.log_weights)[:, np.newaxis] * np.exp(tracks.log_class_probs)
+    with np.errstate(divide="ignore"):
+        return np.asarray(np.log(np.add.reduceat(probs, tracks.offsets[:-1])))
 
 
 def track_moments(tracks: TrackTable) -> tuple[Floats, Floats]:

@@ -62,9 +62,9 @@ class UndetectedTargets(SummaryRepr):
         return poisson_numbers(self.expected_number)
 
     @classmethod
-    def none(cls, state_dim: int) -> UndetectedTargets:
+    def none(cls, state_dim: int, num_classes: int = 0) -> UndetectedTargets:
         """Return the density without targets, before the first scan."""
-        return cls(Poisson.empty(state_dim), (0, 0))
+        return cls(Poisson.empty(state_dim, num_classes), (0, 0))
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)

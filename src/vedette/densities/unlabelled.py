@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from abc import abstractmethod
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any, ClassVar
 
 import numpy as np
@@ -30,6 +30,7 @@ class Unlabelled(MultiTarget):
     log_weights: Floats
     means: Floats
     covs: Floats
+    log_class_probs: Floats
     _weight: ClassVar[str] = "expected_number"
 
     def __post_init__(self) -> None:
@@ -50,6 +51,11 @@ class Unlabelled(MultiTarget):
         return int(self.means.shape[1])
 
     @property
+    def num_classes(self) -> int:
+        """Number of classes of targets; 0 if they have none."""
+        return int(self.log_class_probs.shape[1])
+
+    @property
     @abstractmethod
     def expected_number(self) -> float:
         """Mean number of targets."""
@@ -67,6 +73,7 @@ class Poisson(Unlabelled):
         log_weights: (num_components,) log of the expected number of targets of each component.
         means: (num_components, state_dim).
         covs: (num_components, state_dim, state_dim).
+        log_class_probs: (num_components, num_classes) log probability of each class; 0 classes if targets have none.
 
     The arrays are copied, checked once at creation, and read-only afterwards.
 
@@ -77,6 +84,7 @@ class Poisson(Unlabelled):
     log_weights: Floats
     means: Floats
     covs: Floats
+    log_class_probs: Floats = field(default_factory=checks.no_classes)
 
     @property
     def expected_number(self) -> float:
@@ -102,9 +110,9 @@ class Poisson(Unlabelled):
         return unchecked(cls, *mixture)
 
     @classmethod
-    def empty(cls, state_dim: int) -> Poisson:
+    def empty(cls, state_dim: int, num_classes: int = 0) -> Poisson:
         """Return the density that is certain of no target."""
-        return cls(np.empty(0), *no_gaussians(state_dim))
+        return cls(np.empty(0), *no_gaussians(state_dim), np.empty((0, num_classes)))
 
     @classmethod
     def from_gaussians(cls, expected_numbers: Any, means: Any, covs: Any) -> Poisson:
@@ -123,7 +131,7 @@ class Poisson(Unlabelled):
         `InputError` for faults of form; `error` for values that are not finite or covariances that are not symmetric
         positive definite.
         """
-        checks.check_components("", self.log_weights, self.means, self.covs, error)
+        checks.check_components("", self, error)
 
 
 def poisson_numbers(mean: float) -> Floats:
@@ -148,6 +156,7 @@ class IidCluster(Unlabelled):
             if the density is certain of no target.
         means: (num_components, state_dim).
         covs: (num_components, state_dim, state_dim).
+        log_class_probs: (num_components, num_classes) log probability of each class; 0 classes if targets have none.
 
     The arrays are copied, checked once at creation, and read-only afterwards.
 
@@ -159,6 +168,7 @@ class IidCluster(Unlabelled):
     log_weights: Floats
     means: Floats
     covs: Floats
+    log_class_probs: Floats = field(default_factory=checks.no_classes)
 
     @property
     def expected_number(self) -> float:
@@ -183,9 +193,9 @@ class IidCluster(Unlabelled):
         return unchecked(cls, log_cardinality, *mixture)
 
     @classmethod
-    def empty(cls, state_dim: int) -> IidCluster:
+    def empty(cls, state_dim: int, num_classes: int = 0) -> IidCluster:
         """Return the density that is certain of no target."""
-        return cls(np.zeros(1), np.empty(0), *no_gaussians(state_dim))
+        return cls(np.zeros(1), np.empty(0), *no_gaussians(state_dim), np.empty((0, num_classes)))
 
     @classmethod
     def from_gaussians(cls, cardinality: Any, weights: Any, means: Any, covs: Any) -> IidCluster:
@@ -213,6 +223,6 @@ class IidCluster(Unlabelled):
         checks.check_array("log_weights", self.log_weights, np.float64, (None,))
         num = len(self.log_weights)
         offsets = np.array([0, num] if num else [0])
-        checks.check_mixtures("", offsets, self.log_weights, self.means, self.covs, len(offsets) - 1, error)
+        checks.check_mixtures("", self, offsets, len(offsets) - 1, error)
         if num == 0 and np.any(self.log_cardinality[1:] > -np.inf):
             raise error("log_weights: expected the density of a target, as there may be some; got no component")

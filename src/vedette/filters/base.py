@@ -149,7 +149,7 @@ class LabelledFilterBase(WithBirths, ABC, Generic[BeliefT]):
 
     def initial(self) -> BeliefT:
         """Return the belief before the first scan: no target."""
-        empty: BeliefT = self.kind.empty(self.targets.state_dim)
+        empty: BeliefT = self.kind.empty(self.targets.state_dim, self.targets.num_classes)
         return empty
 
     def _before_scan(self, prior: BeliefT, dt: float, step: Any, births: LMB | None) -> Any:
@@ -207,8 +207,8 @@ class LabelledFilter(SingleSensorFilter, LabelledFilterBase[BeliefT]):
             NumericalError: no hypothesis has positive weight.
         """
         generator(rng)
-        measurements, repeats = check_scan(scan, self.sensor)
-        prior = check_belief(belief, self.kind, self.targets.state_dim)
+        measurements, repeats = check_scan(scan, self.sensor, self.targets.num_classes)
+        prior = check_belief(belief, self.kind, self.targets)
         inputs = self._inputs_after(dt, measurements, pose, step, prior, births)
         before = self._before_scan(prior, inputs[0].dt, step, births)
         return self._taken(before, inputs, rng, [repeats], f"step {step}: ")
@@ -220,7 +220,7 @@ class LabelledFilter(SingleSensorFilter, LabelledFilterBase[BeliefT]):
 
         Truncation here uses the weights before the scan, unlike in `step`.
         """
-        prior, blind = check_belief(belief, self.kind, self.targets.state_dim), self._blind()
+        prior, blind = check_belief(belief, self.kind, self.targets), self._blind()
         inputs = blind._inputs_after(dt, NO_SCAN, NO_POSE, step, prior, births)
         return blind._taken(blind._before_scan(prior, inputs[0].dt, step, births), inputs, None, [], f"step {step}: ")
 
@@ -229,8 +229,8 @@ class LabelledFilter(SingleSensorFilter, LabelledFilterBase[BeliefT]):
     ) -> tuple[BeliefT, FilterInfo]:
         """Return the posterior after a scan at the time of the belief, with no motion, deaths or births; see `step`."""
         generator(rng)
-        measurements, repeats = check_scan(scan, self.sensor)
-        prior = check_belief(belief, self.kind, self.targets.state_dim)
+        measurements, repeats = check_scan(scan, self.sensor, self.targets.num_classes)
+        prior = check_belief(belief, self.kind, self.targets)
         inputs = self._update_inputs(measurements, pose)
         return self._taken(self._before_scan(prior, 0.0, None, None), inputs, rng, [repeats], "")
 

@@ -83,11 +83,11 @@ class _FactoredFilterBase(LabelledFilterBase[FactoredGLMB]):
 
     def initial(self) -> FactoredGLMB:
         """Return the belief before the first scan: no target."""
-        empty = FactoredGLMB.empty(self.targets.state_dim)
+        empty = FactoredGLMB.empty(self.targets.state_dim, self.targets.num_classes)
         return empty if self.births == "labelled" else empty.with_fields(undetected=self._none())
 
     def _none(self) -> UndetectedTargets:
-        return UndetectedTargets.none(self.targets.state_dim)
+        return UndetectedTargets.none(self.targets.state_dim, self.targets.num_classes)
 
     def _births(self, dt: float, step: Any, prior: LabelledDensity | None, births: LMB | None) -> Lmb:
         if self.births == "labelled" or births is not None:
@@ -101,17 +101,17 @@ class _FactoredFilterBase(LabelledFilterBase[FactoredGLMB]):
     def _born(self, dt: float, step: int) -> SplitBirths:
         """Return the births at the sites within the `dt` seconds before a step."""
         birth = self.targets.birth
-        return split_births(birth, dt) if birth.is_active(step) else no_births(birth.state_dim)
+        return split_births(birth, dt) if birth.is_active(step) else no_births(birth)
 
     def _before_scan(self, prior: FactoredGLMB, dt: float, step: Any, births: LMB | None) -> _Before:
-        density, arrivals, error = prior.to_kernel(), no_arrivals(self.targets.state_dim), 0.0
+        density, arrivals, error = prior.to_kernel(), no_arrivals(self.targets.birth), 0.0
         if self.births == "labelled":
             return _Before(density, None, arrivals)
         undetected = self._none() if prior.undetected is None else prior.undetected
         if dt > 0.0:
             # Births given by the caller replace those of the model, both in the region and at sites.
             targets, appear = self.targets, births is None
-            born = self._born(dt, step) if appear else no_births(targets.state_dim)
+            born = self._born(dt, step) if appear else no_births(targets.birth)
             most, error = undetected_component_cap(self.limits, targets.birth), born.error
             arrivals = arrivals_of(undetected, targets, born.undetected, dt, most, appear=appear)
             undetected = with_cells(undetected, targets.birth, dt, appear=appear)
@@ -124,7 +124,7 @@ class _FactoredFilterBase(LabelledFilterBase[FactoredGLMB]):
         scan, reduction, birth = step.inputs[0], step.limits.reduction(), self.targets.birth
         max_merging = 0.0 if self.births == "labelled" else _MAX_MERGING
         factoring = _factoring(self.max_split_error, self.max_factor_labels, step.num_scans, max_merging)
-        before, undetected = no_undetected(self.targets.state_dim), prior.undetected
+        before, undetected = no_undetected(birth), prior.undetected
         if undetected is not None:
             before = before_scan(undetected, birth, step.sensor, scan.measurements, scan.pose)
             reduction = with_faint_candidates(reduction, undetected, birth)

@@ -22,7 +22,7 @@ from vedette.kernels.base.types import Floats, Ints, Lmb
 from vedette.kernels.gaussian.row_noise import row_length
 from vedette.kernels.gaussian.scans import examined_scan
 from vedette.kernels.labelled import births as kernels
-from vedette.models import BirthModel, SensorModel
+from vedette.models import BirthModel, SensorModel, TargetModel
 from vedette.models.arguments import as_array, reject, step_number
 from vedette.models.measurement import MeasurementModel, wrap_periodic
 from vedette.models.row_noise import check_row_noise, measured_part
@@ -34,12 +34,12 @@ _PACKAGE = Path(__file__).parents[1]
 _Density = TypeVar("_Density", GLMB, LMB, FactoredGLMB, Poisson, IidCluster, MultiBernoulli)
 
 
-def check_scan(scan: Any, sensor: SensorModel) -> tuple[Floats, Ints]:
+def check_scan(scan: Any, sensor: SensorModel, num_classes: int) -> tuple[Floats, Ints]:
     """Return the scan as a contiguous (num, meas_dim) array without repeated rows, and the rows that were repeats.
 
     Rows that bring their noise (`vedette.models.with_row_noise`) are longer. Angles are returned in (-pi, pi], and
-    other components with a period within half of it. Warns of values too far below the least possible value for noise,
-    such as a negative range.
+    other components with a period within half of it. num_classes: number of classes of the targets. Warns of values too
+    far below the least possible value for noise, such as a negative range.
 
     Raises:
         InputError: not an array of that shape, a value that is not finite, or an angle beyond a full turn either way,
@@ -56,8 +56,10 @@ def check_scan(scan: Any, sensor: SensorModel) -> tuple[Floats, Ints]:
     if given.size == 0 and given.ndim <= 2:
         return np.empty((0, meas_dim)), _NO_ROWS
     brings_noise = given.ndim == 2 and given.shape[1] != meas_dim
-    if given.ndim != 2 or (brings_noise and given.shape[1] != row_length(meas_dim)):
-        raise InputError(f"scan: expected {expected}; got shape {given.shape}")
+    with_noise = row_length(meas_dim)
+    if given.ndim != 2 or (brings_noise and given.shape[1] not in (with_noise, with_noise + num_classes)):
+        classes = f"; its targets have {num_classes} classes" if given.ndim == 2 and given.shape[1] > with_noise else ""
+        raise InputError(f"scan: expected {expected}; got shape {given.shape}{classes}")
     array = np.array(given, dtype=np.float64, order="C")
     bad, is_below, largest, may_repeat = examined_scan(array, measurement.least, measurement.periods)
     if bad >= 0:
@@ -97,12 +99,17 @@ def _wrapped(scan: Floats, measurement: MeasurementModel) -> Floats:
     return np.column_stack([wrap_periodic(measured, measurement.periods), scan[:, len(angular) :]])
 
 
-def check_belief(belief: object, kind: type[_Density], state_dim: int, name: str = "belief") -> _Density:
-    """Return the belief. Raises `InputError` unless it is of the filter's kind and dimension."""
+def check_belief(
+    belief: object, kind: type[_Density], model: TargetModel | BirthModel, name: str = "belief"
+) -> _Density:
+    """Return the belief. Raises `InputError` unless it is of the filter's kind, with the model's states and classes."""
     if not isinstance(belief, kind):
         raise InputError(f"{name}: expected a {kind.__name__}; got {type(belief).__name__}")
-    if belief.state_dim != state_dim:
-        raise InputError(f"{name}: expected states of dimension {state_dim}; got {belief.state_dim}")
+    if belief.state_dim != model.state_dim:
+        raise InputError(f"{name}: expected states of dimension {model.state_dim}; got {belief.state_dim}")
+    if belief.num_classes != model.num_classes:
+        expected = f"{model.num_classes} classes of targets, as in the birth model"
+        raise InputError(f"{name}: expected {expected}; got {belief.num_classes}")
     return belief
 
 
@@ -117,7 +124,7 @@ def births_for(
     """
     number = step_number(step)
     if births is not None:
-        born = check_belief(births, LMB, birth.state_dim, "births")
+        born = check_belief(births, LMB, birth, "births")
     elif birth.is_active(number):
         born = births_within(births_at(birth, number), birth.period, dt)
     else:
@@ -141,21 +148,21 @@ def is_zero_duration(dt: Any) -> bool:
 
 
 @cache
-def no_births(state_dim: int) -> LMB:
-    """Return an LMB without targets, cached for each dimension."""
-    return LMB.empty(state_dim)
+def no_births(state_dim: int, num_classes: int) -> LMB:
+    """Return an LMB without targets, cached for each dimension and number of classes."""
+    return LMB.empty(state_dim, num_classes)
 
 
 @cache
 def no_births_for_kernel(state_dim: int) -> Lmb:
     """Return an empty birth density in kernel form, cached for each dimension."""
-    return no_births(state_dim).to_kernel()
+    return no_births(state_dim, 0).to_kernel()
 
 
 def births_at(birth: BirthModel, step: int) -> LMB:
     """Return the LMB of the births at `step`, or within the model's period, labelled (step, site)."""
     if not birth.is_active(step):
-        return no_births(birth.state_dim)
+        return no_births(birth.state_dim, birth.num_classes)
     return born_at(births_of(birth), step)
 
 
@@ -182,7 +189,7 @@ def births_within(born: LMB, period: float | None, dt: float, others: LMB | None
 def births_of(birth: BirthModel) -> LMB:
     """Return the births at the sites, labelled with step 0, cached for each model."""
     labels = np.column_stack([np.zeros(birth.num_sites, np.int64), np.arange(birth.num_sites)])
-    tracks = gaussian_tracks(labels, birth.means, birth.covs)
+    tracks = gaussian_tracks(labels, birth.means, birth.covs, np.tile(birth.log_class_probs, (birth.num_sites, 1)))
     return unchecked(LMB, tracks, np.log(birth.existence) - np.log1p(-birth.existence))
 
 

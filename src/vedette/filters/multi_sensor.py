@@ -108,7 +108,7 @@ class MultiSensorFilter(LabelledFilterBase[BeliefT]):
             NumericalError: no association has positive weight.
         """
         taken = self._checked_scans(scans, poses, rng)
-        prior = check_belief(belief, self.kind, self.targets.state_dim)
+        prior = check_belief(belief, self.kind, self.targets)
         if is_zero_duration(dt):
             step_number(step)
             before = self._before_scan(prior, 0.0, step, births)
@@ -137,7 +137,7 @@ class MultiSensorFilter(LabelledFilterBase[BeliefT]):
             if scans[s] is None:
                 continue
             try:
-                scan, repeats = check_scan(scans[s], sensor)
+                scan, repeats = check_scan(scans[s], sensor, self.targets.num_classes)
             except InputError as error:
                 raise InputError(f"scans[{s}]: {error}") from None
             taken.names.append(f"sensor {s}")

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from functools import cache, lru_cache
+from functools import lru_cache
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -28,17 +28,18 @@ FROM_THE_START = 0.15
 _COMPONENTS_A_SITE = 3
 
 
-@cache
-def no_undetected(state_dim: int) -> Undetected:
+@lru_cache(maxsize=100)
+def no_undetected(birth: BirthModel) -> Undetected:
     """Return the kernel input for an empty intensity of undetected targets."""
-    none, cells = no_births(state_dim).undetected, no_cells(state_dim)
-    return Undetected(none, np.empty((0, 0)), cells, np.empty((0, state_dim)), np.zeros(state_dim), 0, 0, 0.0)
+    dim, none = birth.state_dim, no_births(birth).undetected
+    places, std, classes = np.empty((0, dim)), np.zeros(dim), birth.log_class_probs
+    return Undetected(none, np.empty((0, 0)), no_cells(dim), places, std, classes, 0, 0, 0.0)
 
 
-@cache
-def no_arrivals(state_dim: int) -> Arrivals:
+@lru_cache(maxsize=100)
+def no_arrivals(birth: BirthModel) -> Arrivals:
     """Return the kernel input for a period without births."""
-    return without_change(no_births(state_dim).undetected, 1)
+    return without_change(no_births(birth).undetected, 1)
 
 
 def undetected_component_cap(limits: Limits, birth: BirthModel) -> int:
@@ -64,10 +65,11 @@ def split_births(birth: BirthModel, dt: float) -> SplitBirths:
     return SplitBirths(born.take(strong), undetected, float((2.0 * existence * -np.expm1(-existence))[weak].sum()))
 
 
-@cache
-def no_births(state_dim: int) -> SplitBirths:
+@lru_cache(maxsize=100)
+def no_births(birth: BirthModel) -> SplitBirths:
     """Return empty births of both kinds."""
-    return SplitBirths(LMB.empty(state_dim), Poisson.empty(state_dim).to_kernel(), 0.0)
+    sizes = birth.state_dim, birth.num_classes
+    return SplitBirths(LMB.empty(*sizes), Poisson.empty(*sizes).to_kernel(), 0.0)
 
 
 def with_dropped(undetected: UndetectedTargets, before: FactoredGLMB, kept: FactoredGLMB) -> UndetectedTargets:
@@ -105,7 +107,7 @@ def before_scan(
 ) -> Undetected:
     """Return the undetected targets and the places of the measurements in the form that `step_factored` needs."""
     (step, index), found, measured = undetected.next_label, region_births(birth), birth.from_measurements
-    intensity, none = undetected.intensity.to_kernel(), no_undetected(birth.state_dim)
+    intensity, none = undetected.intensity.to_kernel(), no_undetected(birth)
     if found is None or undetected.cells is None:
         return none._replace(intensity=intensity, step=step, first_index=index)
     places, std, learnt = none.places, none.std, undetected.birth_rate
@@ -115,7 +117,8 @@ def before_scan(
             std = np.concatenate([np.hypot(std[:2], longest_lag(pose) * std[2:4]), std[2:]])
         places = sensor.measurement.states_at(scan, pose, len(std))
     rate = 0.0 if learnt is None else learnt.rate
-    return Undetected(intensity, tables_of(undetected), found.cells, places, std, step, index, rate)
+    classes = birth.log_class_probs
+    return Undetected(intensity, tables_of(undetected), found.cells, places, std, classes, step, index, rate)
 
 
 def after_scan(before: UndetectedTargets, missed: Mixture, left: Left, num_measurements: int) -> UndetectedTargets:

@@ -33,7 +33,7 @@ class UnlabelledFilter(SingleSensorFilter, ABC, Generic[_Density]):
 
     def initial(self) -> _Density:
         """Return the belief before the first scan: no target."""
-        empty: _Density = self.kind.empty(self.targets.state_dim)
+        empty: _Density = self.kind.empty(self.targets.state_dim, self.targets.num_classes)
         return empty
 
     def step(
@@ -44,8 +44,8 @@ class UnlabelledFilter(SingleSensorFilter, ABC, Generic[_Density]):
         `rng` is not used; it is accepted so that filters are interchangeable.
         """
         generator(rng)
-        measurements, repeats = check_scan(scan, self.sensor)
-        prior = check_belief(belief, self.kind, self.targets.state_dim)
+        measurements, repeats = check_scan(scan, self.sensor, self.targets.num_classes)
+        prior = check_belief(belief, self.kind, self.targets)
         inputs = self._inputs_after(dt, measurements, pose, step)
         with model_errors():
             posterior, info = self._updated(prior, inputs, f"step {step}: ")

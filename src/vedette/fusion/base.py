@@ -18,9 +18,9 @@ from vedette.kernels.labelled.set_fusion import LOST, SURE
 from vedette.kernels.labelled.validity import is_valid_lmb
 from vedette.models.arguments import real, reject, sequence
 
-# Data type and number of dimensions of the arrays of an LMB: labels, offsets, log weights, means, covariances, logits.
+# Data type and number of dimensions of the arrays of an LMB: labels, offsets, columns of the components, logits.
 _INT, _FLOAT = np.dtype(np.int64), np.dtype(np.float64)
-_FORMS = ((_INT, 2), (_INT, 1), (_FLOAT, 1), (_FLOAT, 2), (_FLOAT, 3), (_FLOAT, 1))
+_FORMS = ((_INT, 2), (_INT, 1), (_FLOAT, 1), (_FLOAT, 2), (_FLOAT, 3), (_FLOAT, 2), (_FLOAT, 1))
 
 
 @dataclass(frozen=True, slots=True)
@@ -134,18 +134,23 @@ class PrevalidatedBeliefs(tuple[Any, ...]):
 
 
 def all_valid(beliefs: Sequence[Any]) -> bool:
-    """Return True if all beliefs are valid LMBs of one state dimension; fast, without reporting faults."""
+    """Return True if all beliefs are valid LMBs of the same states and classes; fast, without reporting faults."""
     if not beliefs or not all(isinstance(belief, LabelledDensity) and belief.is_lmb for belief in beliefs):
         return False
-    if not all(map(_has_kernel_arrays, beliefs)) or len({belief.state_dim for belief in beliefs}) > 1:
+    if not all(map(_has_kernel_arrays, beliefs)) or len(set(map(_sizes, beliefs))) > 1:
         return False
     return all(is_valid_lmb(belief.to_kernel()) for belief in beliefs)
+
+
+def _sizes(belief: LabelledDensity) -> tuple[int, int]:
+    return belief.state_dim, belief.num_classes
 
 
 def _has_kernel_arrays(belief: Any) -> bool:
     """Return True if the arrays of an LMB have the types that kernels expect."""
     tracks, logits = belief.tracks, belief.existence_logit
-    arrays = tracks.labels, tracks.offsets, tracks.log_weights, tracks.means, tracks.covs, logits
+    columns = tracks.log_weights, tracks.means, tracks.covs, tracks.log_class_probs
+    arrays = tracks.labels, tracks.offsets, *columns, logits
     for array, (dtype, ndim) in zip(arrays, _FORMS, strict=True):
         if type(array) is not np.ndarray or array.dtype != dtype or array.ndim != ndim:
             return False
@@ -172,7 +177,7 @@ def check_kinds(given: Sequence[type], kinds: tuple[type, ...], num_sensors: int
 
 
 def check_beliefs(beliefs: Sequence[Any], kinds: tuple[type, ...], num_sensors: int) -> None:
-    """Raise `InputError` unless there is one valid belief per sensor, of the given kinds and one state dimension.
+    """Raise `InputError` unless there is one valid belief per sensor, of the given kinds, states and classes.
 
     The values of `PrevalidatedBeliefs` are not checked.
     """
@@ -182,6 +187,9 @@ def check_beliefs(beliefs: Sequence[Any], kinds: tuple[type, ...], num_sensors: 
     dims = [belief.state_dim for belief in beliefs]
     if len(set(dims)) > 1:
         raise InputError(f"beliefs: expected one state dimension at all sensors; got {dims}")
+    numbers = [belief.num_classes for belief in beliefs]
+    if len(set(numbers)) > 1:
+        raise InputError(f"beliefs: expected one number of classes at all sensors; got {numbers}")
     if isinstance(beliefs, PrevalidatedBeliefs) or all_valid(beliefs):
         return
     for i, belief in enumerate(beliefs):

@@ -14,9 +14,10 @@ from vedette.densities.checks import offsets_of
 from vedette.densities.containers import unchecked
 from vedette.densities.conversions import marginalised_factors
 from vedette.densities.label_sets import WHOLE, in_label_order, join_factors
-from vedette.densities.tracks import places_of
+from vedette.densities.tracks import mean_class_probs, places_of
 from vedette.errors import InputError, NumericalError
 from vedette.fusion.base import FusionInfo, LogLinearPool, PrevalidatedBeliefs, check_beliefs, label_fusion_info
+from vedette.fusion.classes import class_gains, updated_classes
 from vedette.fusion.parallel_sets import (
     check_evidence,
     check_single,
@@ -30,8 +31,8 @@ from vedette.fusion.parallel_sets import (
 from vedette.fusion.powers import ONE, FusionLimits, check_limits
 from vedette.fusion.views import FieldsOfView
 from vedette.internal.probabilities import expit, log_expit
-from vedette.kernels.base.types import Floats, Ints, Tracks
-from vedette.kernels.gaussian.components import components_of
+from vedette.kernels.base.types import Floats, Ints, Mixture, Tracks
+from vedette.kernels.gaussian.components import components_of, taken_components
 from vedette.kernels.gaussian.pooling import reduced_tracks
 from vedette.kernels.labelled.parallel import update_in_parallel
 from vedette.kernels.labelled.stacking import stack_tracks
@@ -136,11 +137,10 @@ class ParallelUpdate:
         """Fuse label by label; the prediction must have single Gaussians."""
         prior, given = prediction.tracks.to_kernel(), posteriors_of(prediction, beliefs, self.missing_existence)
         before = prior.components
-        means, covs, log_overlaps = self._updated_tracks(before.means, before.covs, given.chosen, weights, given.tracks)
+        updated, log_overlaps = self._updated_tracks(before, given.chosen, weights, given.tracks)
         logits = updated_logs(prediction.existence_logit, given.logits, weights) + log_overlaps
         check_evidence(prediction.tracks.labels, logits)
-        after = components_of(before.log_weights, means, covs)
-        tracks = TrackTable.from_kernel(Tracks(prior.labels, prior.offsets, after))
+        tracks = TrackTable.from_kernel(Tracks(prior.labels, prior.offsets, updated))
         present, absent = (
             updated_logs(log_expit(sign * prediction.existence_logit), log_expit(sign * given.logits), weights)
             for sign in (1.0, -1.0)
@@ -175,9 +175,9 @@ class ParallelUpdate:
         own = places_of(np.concatenate([group.labels[group.place_labels] for group in groups]), tables[0].labels)
         chosen = np.concatenate([group.chosen for group in groups])
         tracks = stack_tracks([table.to_kernel() for table in tables[1:]])
-        prior = tables[0].means[own], tables[0].covs[own]
-        means, covs, log_overlaps = self._updated_tracks(*prior, chosen, weights, tracks)
-        joint, log_normaliser = fused_groups(groups, log_overlaps, means, covs, self.limits.max_hypotheses)
+        prior = taken_components(tables[0].to_kernel().components, own)
+        components, log_overlaps = self._updated_tracks(prior, chosen, weights, tracks)
+        joint, log_normaliser = fused_groups(groups, log_overlaps, components, self.limits.max_hypotheses)
         fused = in_label_order(FactoredGLMB.product([FactoredGLMB.of(alone), *joint], prediction.state_dim))
         missing = tuple((np.array(info.missing_labels) + sum(group.num_missing for group in groups)).tolist())
         return fused, replace(
@@ -191,13 +191,19 @@ class ParallelUpdate:
             discarded_weight=-math.expm1(sum(group.log_kept for group in groups)) + 0.0,  # no -0
         )
 
-    def _updated_tracks(
-        self, means: Floats, covs: Floats, chosen: Ints, weights: Floats, tracks: Tracks
-    ) -> tuple[Floats, Floats, Floats]:
+    def _updated_tracks(self, prior: Mixture, chosen: Ints, weights: Floats, tracks: Tracks) -> tuple[Mixture, Floats]:
+        """Return the updated components, and the logs of their integrals."""
+        most = self.limits.max_combinations
         try:
-            return update_in_parallel(means, covs, chosen, weights, tracks, self.limits.max_combinations)
+            means, covs, log_overlaps = update_in_parallel(prior.means, prior.covs, chosen, weights, tracks, most)
         except FloatingPointError as fault:
             raise NumericalError(f"fusion of tracks: {fault}") from None
+        own, classes = mean_class_probs(TrackTable.from_kernel(tracks)), prior.log_class_probs
+        if classes.shape[1] == 0:
+            return components_of(np.zeros(len(means)), means, covs), log_overlaps
+        gains = np.where((chosen >= 0)[..., np.newaxis], class_gains(own[chosen], classes[:, np.newaxis]), 0.0)
+        classes, log_factors = updated_classes(classes, (weights[:, np.newaxis] * gains).sum(axis=1))
+        return components_of(np.zeros(len(means)), means, covs, classes), log_overlaps + log_factors
 
 
 def _moment_matched(belief: LMB) -> LMB:

@@ -19,8 +19,7 @@ from vedette.fusion.base import count_lost
 from vedette.fusion.powers import ONE
 from vedette.fusion.views import sum_over_sensors
 from vedette.internal.probabilities import log_expit, logit
-from vedette.kernels.base.types import Bools, Floats, Ints, Tracks
-from vedette.kernels.gaussian.components import components_of
+from vedette.kernels.base.types import Bools, Floats, Ints, Mixture, Tracks
 from vedette.kernels.gaussian.pooling import pooled_tracks
 from vedette.kernels.labelled.groups import group_log_sums
 from vedette.kernels.labelled.stacking import stack_tracks
@@ -188,11 +187,11 @@ def check_single(prediction: FactoredGLMB) -> None:
 
 
 def fused_groups(
-    groups: Sequence[GroupedSets], log_overlaps: Floats, means: Floats, covs: Floats, max_sets: int
+    groups: Sequence[GroupedSets], log_overlaps: Floats, components: Mixture, max_sets: int
 ) -> tuple[list[FactoredGLMB], float]:
     """Return one density per group, with one Gaussian per label, and the log of the product of their total weights.
 
-    log_overlaps (num,), means (num, dim), covs (num, dim, dim): of the places of all groups, concatenated.
+    log_overlaps (num,), components (num of weight 1): of the places of all groups, concatenated.
     """
     fused, log_normaliser, start = [], 0.0, 0
     for group in groups:
@@ -204,11 +203,11 @@ def fused_groups(
         if not math.isfinite(total):
             raise NumericalError(f"fusion: the sensors contradict each other on the labels {group.labels.tolist()}")
         log_normaliser += total
-        fused.append(_group(group.labels, places[order], log_weights[order] - total, means, covs))
+        fused.append(_group(group.labels, places[order], log_weights[order] - total, components))
     return fused, log_normaliser
 
 
-def _group(labels: Ints, places: Ints, log_weights: Floats, means: Floats, covs: Floats) -> FactoredGLMB:
+def _group(labels: Ints, places: Ints, log_weights: Floats, components: Mixture) -> FactoredGLMB:
     """Return a GLMB of weighted sets in which each label has the Gaussian of the moments of its places."""
     members = places >= 0
     held = np.flatnonzero(members.any(axis=0))
@@ -216,8 +215,8 @@ def _group(labels: Ints, places: Ints, log_weights: Floats, means: Floats, covs:
     set_of, label_of = np.nonzero(columns)
     order = np.argsort(label_of, kind="stable")
     pool, shares = places[:, held][columns][order], np.exp(log_weights)[set_of[order]]
-    components = components_of(np.zeros(len(means)), means, covs)
-    table = Tracks(np.zeros((len(means), 2), np.int64), np.arange(len(means) + 1), components)
+    count = len(components.log_weights)
+    table = Tracks(np.zeros((count, 2), np.int64), np.arange(count + 1), components)
     offsets = offsets_of(np.bincount(label_of, minlength=num))
     tracks = pooled_tracks(table, labels[held], offsets, pool, shares, ONE)
     hyp_offsets = offsets_of(columns.sum(axis=1))

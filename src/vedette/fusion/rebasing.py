@@ -6,7 +6,8 @@ import numpy as np
 
 from vedette.densities import LMB, TrackTable, track_moments
 from vedette.densities.containers import unchecked
-from vedette.densities.tracks import gaussian_tracks, place_labels, take_tracks
+from vedette.densities.tracks import gaussian_tracks, mean_class_probs, place_labels, take_tracks
+from vedette.fusion.classes import class_gains, updated_classes
 from vedette.kernels.base.types import Floats
 from vedette.kernels.labelled.stacking import stack_tracks
 
@@ -29,7 +30,9 @@ def rebase(posterior: LMB, own: LMB, prediction: LMB) -> LMB:
     The information of the scan is the ratio of the sensor's posterior to its own prediction, a Gaussian of information
     Y = P^-1 - P_own^-1, its negative eigenvalues set to 0. With p(x) the new prediction,
 
-        logit = l_new + (l - l_own) + log integral of p(x) N(x; m, P) / N(x; m_own, P_own).
+        logit = l_new + (l - l_own) + log integral of p(x) N(x; m, P) / N(x; m_own, P_own),
+
+    and the class probabilities times the ratio of those of the posterior and its own prediction.
 
     Labels that the sensor's own prediction or posterior lacks are taken from the prediction: the scan has no
     information about them. Mixtures become Gaussians of their moments. If both predictions are the same object, the
@@ -45,9 +48,12 @@ def rebase(posterior: LMB, own: LMB, prediction: LMB) -> LMB:
     new_means, new_covs = (moment[after] for moment in track_moments(posterior.tracks))
     means[at], covs[at], gained = _updated((means[at], covs[at]), (own_means, own_covs), (new_means, new_covs))
     said, known = posterior.existence_logit[after], own.existence_logit[before]
+    classes = mean_class_probs(prediction.tracks)
+    new_classes = mean_class_probs(posterior.tracks)[after], mean_class_probs(own.tracks)[before]
+    classes[at], log_factors = updated_classes(classes[at], class_gains(*new_classes))
     with np.errstate(invalid="ignore"):  # an impossible or certain label that stays so carries no information
-        logits[at] += np.where(said == known, 0.0, said - known) + gained
-    return unchecked(LMB, gaussian_tracks(prediction.tracks.labels, means, covs), logits)
+        logits[at] += np.where(said == known, 0.0, said - known) + gained + log_factors
+    return unchecked(LMB, gaussian_tracks(prediction.tracks.labels, means, covs, classes), logits)
 
 
 def _updated(

@@ -2,6 +2,7 @@
 
 from vedette.models.bias import Bias
 from vedette.models.birth import BirthModel, MeasurementBirth
+from vedette.models.classes import ClassFeatures
 from vedette.models.clutter import ClutterModel, ClutterSampler, measurement_space_clutter
 from vedette.models.detection import (
     DetectionModel,
@@ -39,6 +40,7 @@ __all__ = [
     "Bias",
     "BirthModel",
     "CellGrid",
+    "ClassFeatures",
     "ClutterModel",
     "ClutterSampler",
     "DetectionModel",

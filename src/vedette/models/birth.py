@@ -104,6 +104,8 @@ class BirthModel:
             `from_measurements`.
         period: time in s for which birth probabilities are given, also those from measurements; None: each step,
             whatever its length (the paper).
+        class_probs: (num_classes,) probability of each class of target, which sum to 1; None: targets have no classes.
+            The classes of a sensor's measurements are in the same order (`vedette.models.with_row_noise`).
         num_sites: number of birth sites.
         state_dim: length of a target's state.
 
@@ -118,6 +120,7 @@ class BirthModel:
     from_measurements: MeasurementBirth | None = None
     period: float | None = None
     anywhere: UndetectedModel | None = None
+    class_probs: Floats | None = None
     num_sites: int = field(init=False)
     state_dim: int = field(init=False)
 
@@ -141,10 +144,22 @@ class BirthModel:
             instance("BirthModel.anywhere", self.anywhere, UndetectedModel)
         if self.period is not None:
             object.__setattr__(self, "period", positive("BirthModel.period", self.period))
+        if self.class_probs is not None:
+            object.__setattr__(self, "class_probs", _class_probs(self.class_probs))
         for name, value in (("existence", existence), ("means", means), ("covs", covs), ("steps", _steps(self.steps))):
             object.__setattr__(self, name, value)
         for name, size in (("num_sites", num_sites), ("state_dim", state_dim)):
             object.__setattr__(self, name, size)
+
+    @property
+    def num_classes(self) -> int:
+        """Number of classes of targets; 0 if they have none."""
+        return 0 if self.class_probs is None else len(self.class_probs)
+
+    @property
+    def log_class_probs(self) -> Floats:
+        """Log probability of each class of target, shape (num_classes,); empty if they have none."""
+        return np.empty(0) if self.class_probs is None else np.log(self.class_probs)
 
     def is_active(self, step: int) -> bool:
         """Return True if targets may be born at the sites at this filter step."""
@@ -154,6 +169,13 @@ class BirthModel:
     def none(cls, state_dim: int) -> BirthModel:
         """Return the model without any births."""
         return cls(np.empty(0), *no_gaussians(state_dim))
+
+
+def _class_probs(given: object) -> Floats:
+    probs = float_array("BirthModel.class_probs", given, (None,))
+    if len(probs) < 2 or (probs <= 0.0).any() or abs(probs.sum() - 1.0) > 1e-6:
+        raise reject("BirthModel.class_probs", "at least 2 probabilities above 0 that sum to 1", probs.tolist())
+    return np.asarray(probs / probs.sum())
 
 
 def _steps(steps: Iterable[int] | None) -> frozenset[int] | None:

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 from vedette.errors import InputError
 from vedette.kernels.base.compile import kernel
 from vedette.kernels.base.types import Floats
-from vedette.kernels.gaussian.row_noise import MISSING, replace_noise
+from vedette.kernels.gaussian.row_noise import MISSING, replace_noise, row_length
 from vedette.models.arguments import float_array, real
 
 LOG_RATIO_OF_MISSING = 0.5 * math.log(2.0 * math.pi * MISSING)  # makes up for the density of the wide Gaussian
@@ -24,6 +24,7 @@ def with_row_noise(
     covs: ArrayLike,
     log_likelihood_ratios: ArrayLike | None = None,
     added: ArrayLike | None = None,
+    log_class_ratios: ArrayLike | None = None,
 ) -> Floats:
     """Return a scan whose measurements bring their noise, (num, m + m (m + 1) / 2 + 1), as all filters take it.
 
@@ -35,6 +36,8 @@ def with_row_noise(
             signal-to-noise ratio, if it is of a target and if it is false; None: 0.
         added: (num, m, m) covariances in addition to those, or to the sensor's noise model where it holds, such as
             those of the sensor's own pose; None: 0.
+        log_class_ratios: (num, num_classes) the same ratio as `log_likelihood_ratios`, of further features, for a
+            target of each class of `BirthModel.class_probs`; these are appended to the rows. None: no such features.
 
     Raises:
         InputError: an array of another shape, a number that is not finite, a covariance that is not symmetric and
@@ -64,6 +67,8 @@ def with_row_noise(
         given[row, component, component] = MISSING
         ratios[row] += LOG_RATIO_OF_MISSING
     scan = np.column_stack([table, given[:, first, second], ratios])
+    if log_class_ratios is not None:
+        scan = np.column_stack([scan, float_array("log_class_ratios", log_class_ratios, (num, None))])
     check_row_noise("covs", scan, dim)
     return scan
 
@@ -112,12 +117,13 @@ def row_noise(
     correlation: float = 0.0,
     log_likelihood_ratio: float = 0.0,
     added: Floats | None = None,
+    log_class_ratios: Sequence[float] = (),
 ) -> tuple[float, ...]:
     """Return what follows a measurement in its row, as in `with_row_noise`.
 
     stds: of each component, 0 for that of the sensor's noise model. missing: of each component, True if it was not
     measured. correlation: of the first two components. added: (m, m) covariance in addition to these, or to that of the
-    noise model.
+    noise model. log_class_ratios: of each class; () if the features of classes are not measured.
     """
     own = [math.sqrt(MISSING) if gap else std for std, gap in zip(stds, missing, strict=True)]
     covs = [own[a] * own[b] if a == b else 0.0 for a in range(len(own)) for b in range(a + 1)]
@@ -128,7 +134,7 @@ def row_noise(
         own_covs[0][places] = covs
         more = np.where(np.logical_or.outer(missing, missing), 0.0, added)
         covs = _sum(own_covs, more[np.newaxis])[0][places].tolist()
-    return (*covs, LOG_RATIO_OF_MISSING * sum(missing) + log_likelihood_ratio)
+    return (*covs, LOG_RATIO_OF_MISSING * sum(missing) + log_likelihood_ratio, *log_class_ratios)
 
 
 def _sum(covs: Floats, added: Floats) -> Floats:
@@ -167,5 +173,5 @@ def check_row_noise(place: str, scan: Floats, meas_dim: int) -> None:
     wrong = np.linalg.eigvalsh(correlations)[:, 0] <= 0.0
     if wrong.any():
         row = int(np.argmax(wrong))
-        got = scan[row, meas_dim:-1].tolist()
+        got = scan[row, meas_dim : row_length(meas_dim) - 1].tolist()
         raise InputError(f"{place}: expected positive definite covariances of rows; got {got} in row {row}")

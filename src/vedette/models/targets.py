@@ -22,6 +22,7 @@ class TargetModel:
         survival: survival model.
         birth: birth model.
         state_dim: length of a target's state.
+        num_classes: number of classes of targets, as in the birth model; 0 if they have none.
 
     Raises:
         InputError: a part of another kind, or models of different state dimensions.
@@ -31,6 +32,7 @@ class TargetModel:
     survival: SurvivalModel
     birth: BirthModel
     state_dim: int = field(init=False)
+    num_classes: int = field(init=False)
 
     def __post_init__(self) -> None:
         for name, kind in _KINDS.items():
@@ -38,6 +40,7 @@ class TargetModel:
             if not isinstance(value, kind):
                 raise InputError(f"{name}: expected a {kind.__name__}; got {type(value).__name__}")
         object.__setattr__(self, "state_dim", self.motion.state_dim)
+        object.__setattr__(self, "num_classes", self.birth.num_classes)
         if self.birth.state_dim != self.state_dim:
             raise InputError(
                 f"birth.means: expected states of dimension {self.state_dim}, as the motion model; "

@@ -34,7 +34,7 @@ class _Reference:
 
     def initial(self) -> LMB:
         """Return a density without targets."""
-        return LMB.empty(self.targets.state_dim)
+        return LMB.empty(self.targets.state_dim, self.targets.num_classes)
 
     def _believed(self, labels: Any, means: Floats, covs: Floats) -> tuple[LMB, FilterInfo]:
         info = unknown_info(len(means))

@@ -109,7 +109,9 @@ def births_from_scans(
     if model is None:
         return None
     first = birth.num_sites if owner is None else OWN_LABELS * (owner + 1)
-    parameters = BirthsOfMeasurements(model.std, float(model.expected), float(model.max_existence), step, first)
+    parameters = BirthsOfMeasurements(
+        model.std, birth.log_class_probs, float(model.expected), float(model.max_existence), step, first
+    )
     scanned = [s for s, scan in enumerate(scans) if scan is not None]
     checked = [pose_vector("pose", poses[s]) for s in scanned]
     if len(scanned) == 1:

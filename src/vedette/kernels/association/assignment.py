@@ -29,6 +29,7 @@ class Options(NamedTuple):
     component_log_weights: Floats  # (num_entries,) of an option they sum to its weight; -inf outside the gate
     whitened: Floats  # (num_entries, meas_dim) whitened residuals of the components of a detection
     updated: Floats  # (num_entries, state_dim + 1, state_dim) mean, covariance of those that bend or are at an edge
+    log_class_probs: Floats  # (num_entries, num_classes) updated; 0 classes if the scan has no features of classes
     num_measurements: int  # of the scan
 
 

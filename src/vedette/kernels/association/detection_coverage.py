@@ -110,8 +110,17 @@ def _with_spare_row(options: Options) -> Options:
     for option in range(num):
         columns[option] = options.columns[option]
         log_weights[option] = options.log_weights[option]
-    entries, weights, whitened = options.entries, options.component_log_weights, options.whitened
-    return Options(offsets, columns, log_weights, entries, weights, whitened, options.updated, options.num_measurements)
+    return Options(
+        offsets,
+        columns,
+        log_weights,
+        options.entries,
+        options.component_log_weights,
+        options.whitened,
+        options.updated,
+        options.log_class_probs,
+        options.num_measurements,
+    )
 
 
 @kernel

@@ -24,7 +24,8 @@ from vedette.kernels.association.predicted import Rows, expect_rows, log_or_minu
 from vedette.kernels.base.arrays import group_members
 from vedette.kernels.base.compile import borrowing, kernel
 from vedette.kernels.base.types import Floats, Ints, Mixture, ScanInput, Sensor
-from vedette.kernels.gaussian.components import copy_component, copy_components, make_components
+from vedette.kernels.gaussian.classes import room_for_classes
+from vedette.kernels.gaussian.components import components_like, copy_component, copy_components
 from vedette.kernels.gaussian.detection import moments_if_missed
 from vedette.kernels.gaussian.innovation import copy_innovation
 from vedette.kernels.gaussian.linalg import log_add
@@ -62,7 +63,7 @@ def seen_intensity(intensity: Mixture, scan: ScanInput, sensor: Sensor) -> Rows:
     The rows are never absent.
     """
     num, state_dim, meas_dim = len(intensity.log_weights), intensity.means.shape[1], len(sensor.periods)
-    rows = make_rows(num, num, state_dim, meas_dim)
+    rows = make_rows(num, num, intensity, meas_dim)
     for c in range(num):
         rows.labels[c, 0], rows.labels[c, 1] = 0, 0
         rows.offsets[c + 1], rows.log_absent[c] = c + 1, -math.inf
@@ -79,8 +80,7 @@ def missed_intensity(seen: Rows, scan: ScanInput, sensor: Sensor, num: int) -> t
     detections is Poisson.
     """
     components = seen.components
-    state_dim = components.means.shape[1]
-    out, expected, state = make_components(num, state_dim), 0.0, np.empty(state_dim)
+    out, expected, state = components_like(components, num), 0.0, np.empty(components.means.shape[1])
     for c in range(num):
         detected = seen.innovation.prob_detection[c]
         expected += math.exp(components.log_weights[c]) * detected
@@ -96,7 +96,9 @@ def missed_intensity(seen: Rows, scan: ScanInput, sensor: Sensor, num: int) -> t
 def _gated_pairs(seen: Rows, num_local: int, scan: Floats, log_clutter: Floats, sight: Sight, gate: float) -> _Pairs:
     near = near_measurements(seen, scan, sight.sensor.periods, gate)
     num, num_rows = near.offsets[len(near.offsets) - 1], len(seen.log_absent)
-    options = make_room(0, num, num, len(scan), len(sight.sensor.periods), room_for_updated(seen, num))
+    meas_dim = len(sight.sensor.periods)
+    classes = room_for_classes(scan, meas_dim, num)
+    options = make_room(0, num, num, len(scan), meas_dim, room_for_updated(seen, num), classes)
     components, filled = np.empty(num, np.int64), 0
     for c in range(num_rows):
         own = c - (num_rows - num_local)
@@ -173,9 +175,10 @@ def candidates_of(
     pairs = _gated_pairs(seen, num_local, scan.measurements, log_clutter, sight, gate)
     chosen, log_left_out, left_out = _chosen(pairs, unclaimed, least_logit)
     num, meas_dim = len(chosen.measurements), len(sensor.periods)
-    rows = make_rows(num, chosen.num_pairs, seen.components.means.shape[1], meas_dim)
+    rows = make_rows(num, chosen.num_pairs, seen.components, meas_dim)
     updated = room_for_updated(seen, chosen.num_pairs)
-    options = make_room(num, 2 * num, chosen.num_pairs, len(scan.measurements), meas_dim, updated)
+    classes = room_for_classes(scan.measurements, meas_dim, chosen.num_pairs)
+    options = make_room(num, 2 * num, chosen.num_pairs, len(scan.measurements), meas_dim, updated, classes)
     for row in range(num):
         j = chosen.measurements[row]
         rows.labels[row, 0], rows.labels[row, 1] = label[0], label[1] + j

@@ -18,8 +18,8 @@ def joined_rows(rows: Rows, options: Options, new: Rows, new_options: Options) -
     """Return rows and their options, followed by others of the same scan."""
     num_rows, num_new = len(rows.log_absent), len(new.log_absent)
     num, num_components = rows.offsets[num_rows], rows.offsets[num_rows] + new.offsets[num_new]
-    meas_dim, state_dim = rows.innovation.whitened_cross.shape[1:]
-    out = make_rows(num_rows + num_new, num_components, state_dim, meas_dim)
+    meas_dim = rows.innovation.predicted.shape[1]
+    out = make_rows(num_rows + num_new, num_components, rows.components, meas_dim)
     _copy_rows(rows, out, 0, 0)
     _copy_rows(new, out, num_rows, num)
     num_options, num_entries = options.offsets[num_rows], len(options.component_log_weights)
@@ -37,6 +37,7 @@ def joined_rows(rows: Rows, options: Options, new: Rows, new_options: Options) -
         component_log_weights,
         whitened,
         room_for_updated(out, len(component_log_weights)),
+        np.empty((len(component_log_weights), options.log_class_probs.shape[1])),
         options.num_measurements,
     )
     for entry in range(num_entries):
@@ -58,9 +59,11 @@ def joined_rows(rows: Rows, options: Options, new: Rows, new_options: Options) -
 
 @inlined
 def copy_entry(source: Options, entry: int, out: Options, at: int) -> None:
-    """Copy the whitened residual of an entry, and its updated moments if both have components that bend."""
+    """Copy residual and class probabilities of an entry, and its updated moments if both have components that bend."""
     for a in range(source.whitened.shape[1]):
         out.whitened[at, a] = source.whitened[entry, a]
+    for k in range(source.log_class_probs.shape[1]):
+        out.log_class_probs[at, k] = source.log_class_probs[entry, k]
     if source.updated.shape[0] > 0 and out.updated.shape[0] > 0:
         for i in range(source.updated.shape[1]):
             for j in range(source.updated.shape[2]):

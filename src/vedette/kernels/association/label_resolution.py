@@ -56,6 +56,7 @@ def _make_choice(num: int) -> _Choice:
         np.empty(0),
         np.empty((0, 0)),
         np.empty((0, 0, 0)),
+        np.empty((0, 0)),
         num,
     )
     return _Choice(options, counted_ints(num), make_dual_work(num, num), np.empty(num, np.int64))

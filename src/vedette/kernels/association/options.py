@@ -17,6 +17,7 @@ from vedette.kernels.association.predicted import Rows, log_or_minus_inf
 from vedette.kernels.association.truncation import Truncation
 from vedette.kernels.base.compile import borrowing, inlined, kernel
 from vedette.kernels.base.types import Floats, Ints, ScanInput, Sensor
+from vedette.kernels.gaussian.classes import room_for_classes, update_classes
 from vedette.kernels.gaussian.detection import detection_probability, moments_if_missed
 from vedette.kernels.gaussian.innovation import copy_innovation, whiten, write_posterior
 from vedette.kernels.gaussian.relinearisation import Pair, PairWork, make_pair_work, update_pair
@@ -33,17 +34,24 @@ class Sight(NamedTuple):
 
 @kernel
 def make_options(num_rows: int, num_components: int, num_measurements: int, state_dim: int, meas_dim: int) -> Options:
-    """Return arrays for every possible option."""
+    """Return arrays for every possible option of measurements without features of classes."""
     most_options, most_entries = num_rows * (num_measurements + 2), num_components * (num_measurements + 1)
     updated = np.empty((most_entries, state_dim + 1, state_dim))
-    return make_room(num_rows, most_options, most_entries, num_measurements, meas_dim, updated)
+    classes = np.empty((most_entries, 0))
+    return make_room(num_rows, most_options, most_entries, num_measurements, meas_dim, updated, classes)
 
 
 @kernel
 def make_room(
-    num_rows: int, most_options: int, most_entries: int, num_measurements: int, meas_dim: int, updated: Floats
+    num_rows: int,
+    most_options: int,
+    most_entries: int,
+    num_measurements: int,
+    meas_dim: int,
+    updated: Floats,
+    log_class_probs: Floats,
 ) -> Options:
-    """Return arrays for this number of options and entries. updated: as in `Options`."""
+    """Return arrays for this number of options and entries. updated, log_class_probs: as in `Options`."""
     return Options(
         np.zeros(num_rows + 1, np.int64),
         np.empty(most_options, np.int64),
@@ -52,18 +60,20 @@ def make_room(
         np.empty(most_entries),
         np.empty((most_entries, meas_dim)),
         updated,
+        log_class_probs,
         num_measurements,
     )
 
 
 @kernel
-def _room_for(rows: Rows, near: Near, num_measurements: int, meas_dim: int) -> Options:
+def _room_for(rows: Rows, near: Near, scan: Floats, meas_dim: int) -> Options:
     """Return arrays for the options of rows with the measurements near them."""
     num, most_entries = len(rows.log_absent), 0
     for row in range(num):
         most_entries += (rows.offsets[row + 1] - rows.offsets[row]) * (near.offsets[row + 1] - near.offsets[row] + 1)
     updated = room_for_updated(rows, most_entries)
-    return make_room(num, near.offsets[num] + 2 * num, most_entries, num_measurements, meas_dim, updated)
+    classes = room_for_classes(scan, meas_dim, most_entries)
+    return make_room(num, near.offsets[num] + 2 * num, most_entries, len(scan), meas_dim, updated, classes)
 
 
 @kernel
@@ -87,6 +97,7 @@ def view_options(options: Options, num_rows: int, num_measurements: int) -> Opti
         options.component_log_weights,
         options.whitened,
         options.updated,
+        options.log_class_probs,
         num_measurements,
     )
 
@@ -143,7 +154,7 @@ def weigh_detection(
 ) -> float:
     """Return the log weight of component `c` detected as a measurement, relative to clutter; -inf outside the gate.
 
-    Writes its whitened residual, and its updated moments if it bends, at `entry`.
+    Writes its whitened residual, its updated moments if it bends, and its class probabilities, at `entry`.
     """
     innovation = rows.innovation
     distance, log_norm = 0.0, innovation.log_norm[c]
@@ -158,6 +169,9 @@ def weigh_detection(
         return -math.inf
     # The predicted component times p_D g(z | x) / kappa(z), integrated over x.
     weight = rows.components.log_weights[c] + log_norm - 0.5 * distance - log_clutter
+    if out.log_class_probs.shape[1] > 0:
+        prior, posterior = rows.components.log_class_probs[c], out.log_class_probs[entry]
+        weight += update_classes(prior, measurement, innovation.predicted.shape[1], posterior)
     detected = innovation.prob_detection[c]
     if innovation.at_edge[c]:
         detected = _detected_there(rows, c, sight, out.whitened[entry], out.updated[entry])
@@ -275,8 +289,8 @@ def weighed_options_at(
     rows: Rows, scan: ScanInput, sensor: Sensor, caps: Truncation, log_clutter: Floats
 ) -> tuple[Options, float, int]:
     """Return the result of `weighed_options`; log_clutter: (num_measurements,) written as in `weigh_options`."""
-    num, near = len(scan.measurements), near_measurements(rows, scan.measurements, sensor.periods, caps.gate)
-    options = _room_for(rows, near, num, len(sensor.periods))
+    near = near_measurements(rows, scan.measurements, sensor.periods, caps.gate)
+    options = _room_for(rows, near, scan.measurements, len(sensor.periods))
     work = make_pair_work(rows.components.means.shape[1], len(sensor.periods))
     log_total, num_raised = weigh_options(rows, near, scan, sensor, caps, log_clutter, work, options)
     return options, log_total, num_raised

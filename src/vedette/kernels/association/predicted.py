@@ -14,7 +14,7 @@ import numpy as np
 from vedette.errors import ModelError
 from vedette.kernels.base.compile import borrowing, inlined, kernel
 from vedette.kernels.base.types import Floats, Ints, Lmb, Mixture, Motion, ScanInput, Sensor, Tracks
-from vedette.kernels.gaussian.components import borrowed_components, copy_component, copy_components, make_components
+from vedette.kernels.gaussian.components import borrowed_components, components_like, copy_component, copy_components
 from vedette.kernels.gaussian.innovation import Innovation, expect, make_innovation
 from vedette.kernels.gaussian.linalg import log_add
 from vedette.kernels.gaussian.prediction import predict
@@ -37,13 +37,14 @@ def log_or_minus_inf(value: float) -> float:
 
 
 @kernel
-def make_rows(num_rows: int, num_components: int, state_dim: int, meas_dim: int) -> Rows:
+def make_rows(num_rows: int, num_components: int, like: Mixture, meas_dim: int) -> Rows:
+    """Return room for rows. like: components with the same columns."""
     return Rows(
         np.empty((num_rows, 2), np.int64),
         np.zeros(num_rows + 1, np.int64),
         np.empty(num_rows),
-        make_components(num_components, state_dim),
-        make_innovation(num_components, state_dim, meas_dim),
+        components_like(like, num_components),
+        make_innovation(num_components, like.means.shape[1], meas_dim),
     )
 
 
@@ -145,9 +146,8 @@ def rows_of_scan(tracks: Tracks, scan: ScanInput, motion: Motion | None, sensor:
         return standing
     # Every component has its innovation here once, for any number of hypotheses with its track.
     num_rows = len(tracks.labels) + len(sites.labels)
-    rows = make_rows(
-        num_rows, len(tracks.components.log_weights) + len(sites.components.log_weights), state_dim, meas_dim
-    )
+    num_components = len(tracks.components.log_weights) + len(sites.components.log_weights)
+    rows = make_rows(num_rows, num_components, tracks.components, meas_dim)
     predict_rows(tracks, scan, motion, sensor, rows, make_scratch(state_dim, meas_dim))
     return rows
 
@@ -155,8 +155,8 @@ def rows_of_scan(tracks: Tracks, scan: ScanInput, motion: Motion | None, sensor:
 @kernel
 def standing_rows(tracks: Tracks, meas_dim: int) -> Rows:
     """Return the tracks unchanged as rows: no births, deaths or motion, each surely present; without `expect_rows`."""
-    num, state_dim = tracks.components.means.shape
-    rows = make_rows(len(tracks.labels), num, state_dim, meas_dim)
+    num = len(tracks.components.log_weights)
+    rows = make_rows(len(tracks.labels), num, tracks.components, meas_dim)
     for i in range(len(tracks.labels)):
         rows.labels[i, 0], rows.labels[i, 1] = tracks.labels[i, 0], tracks.labels[i, 1]
         rows.log_absent[i], rows.offsets[i + 1] = -math.inf, tracks.offsets[i + 1]

@@ -30,6 +30,7 @@ class Mixture(NamedTuple):
     log_weights: Floats  # (num,)
     means: Floats  # (num, state_dim)
     covs: Floats  # (num, state_dim, state_dim)
+    log_class_probs: Floats  # (num, num_classes) log probability of each class of target; 0 classes: not modelled
 
 
 class Tracks(NamedTuple):

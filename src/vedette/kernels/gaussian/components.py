@@ -11,13 +11,22 @@ import numpy as np
 
 from vedette.kernels.base.compile import borrowing, inlined, kernel
 from vedette.kernels.base.types import Floats, Ints, Mixture
+from vedette.kernels.gaussian.classes import merge_classes
 from vedette.kernels.gaussian.mixtures import match_all, match_components
 
 
 @kernel
-def make_components(num: int, state_dim: int) -> Mixture:
+def make_components(num: int, state_dim: int, num_classes: int) -> Mixture:
     """Room for this number of components."""
-    return Mixture(np.empty(num), np.empty((num, state_dim)), np.empty((num, state_dim, state_dim)))
+    return Mixture(
+        np.empty(num), np.empty((num, state_dim)), np.empty((num, state_dim, state_dim)), np.empty((num, num_classes))
+    )
+
+
+@kernel
+def components_like(mixture: Mixture, num: int) -> Mixture:
+    """Room for this number of components, with states and classes as in `mixture`."""
+    return make_components(num, mixture.means.shape[1], mixture.log_class_probs.shape[1])
 
 
 @inlined
@@ -32,9 +41,11 @@ def copy_gaussian(means: Floats, covs: Floats, source: int, out_means: Floats, o
 
 @inlined
 def copy_component(mixture: Mixture, source: int, out: Mixture, target: int) -> None:
-    """Copy component `source` to place `target`."""
+    """Copy component `source` to place `target`; without its classes where `out` has none."""
     out.log_weights[target] = mixture.log_weights[source]
     copy_gaussian(mixture.means, mixture.covs, source, out.means, out.covs, target)
+    for k in range(out.log_class_probs.shape[1]):
+        out.log_class_probs[target, k] = mixture.log_class_probs[source, k]
 
 
 @inlined
@@ -47,7 +58,12 @@ def copy_components(mixture: Mixture, first: int, last: int, out: Mixture, start
 
 def _between(mixture: Mixture, first: int, last: int) -> Mixture:
     """Components `first:last`, as views."""
-    return Mixture(mixture.log_weights[first:last], mixture.means[first:last], mixture.covs[first:last])
+    return Mixture(
+        mixture.log_weights[first:last],
+        mixture.means[first:last],
+        mixture.covs[first:last],
+        mixture.log_class_probs[first:last],
+    )
 
 
 components_between = kernel(_between)
@@ -57,7 +73,10 @@ borrowed_components = inlined(_between)  # for kernels that only borrow arrays
 @kernel
 def own_components(mixture: Mixture, num: int) -> Mixture:
     """The first `num` components in arrays of their own."""
-    return Mixture(mixture.log_weights[:num].copy(), mixture.means[:num].copy(), mixture.covs[:num].copy())
+    classes = mixture.log_class_probs[:num]
+    if classes.shape[1] > 0:  # an empty array costs as much to copy as one of numbers
+        classes = classes.copy()
+    return Mixture(mixture.log_weights[:num].copy(), mixture.means[:num].copy(), mixture.covs[:num].copy(), classes)
 
 
 @kernel
@@ -66,7 +85,7 @@ def grown_components(mixture: Mixture, filled: int, needed: int) -> Mixture:
     room = len(mixture.log_weights)
     if needed <= room:
         return mixture
-    longer = make_components(max(needed, 2 * room), mixture.means.shape[1])
+    longer = components_like(mixture, max(needed, 2 * room))
     copy_components(mixture, 0, filled, longer, 0)
     return longer
 
@@ -75,7 +94,7 @@ def grown_components(mixture: Mixture, filled: int, needed: int) -> Mixture:
 def stacked_mixtures(first: Mixture, second: Mixture) -> Mixture:
     """The components of both, in their order."""
     num, more = len(first.log_weights), len(second.log_weights)
-    out = make_components(num + more, first.means.shape[1])
+    out = components_like(first, num + more)
     copy_components(first, 0, num, out, 0)
     copy_components(second, 0, more, out, num)
     return out
@@ -83,15 +102,20 @@ def stacked_mixtures(first: Mixture, second: Mixture) -> Mixture:
 
 @inlined
 def merge_components(mixture: Mixture, chosen: Ints, weights: Floats, count: int, out: Mixture, target: int) -> None:
-    """Write the moments of the first `count` of `chosen` as one component, see `match_components`; not its weight."""
+    """Write the moments and mean class probabilities of the first `count` of `chosen` as one component.
+
+    See `match_components`; its weight is not written.
+    """
     match_components(chosen, weights, count, mixture.means, mixture.covs, out.means[target], out.covs[target])
+    if out.log_class_probs.shape[1] > 0:
+        merge_classes(mixture.log_class_probs, chosen, weights, count, out.log_class_probs[target])
 
 
 @borrowing
 def merge_all(
     mixture: Mixture, count: int, components: Ints, weights: Floats, log_weight: float, out: Mixture, target: int
 ) -> None:
-    """Write the moments of the first `count` components as one of the given weight. components, weights: work."""
+    """Write the first `count` components merged into one of the given weight. components, weights: work."""
     out.log_weights[target] = log_weight
     match_all(
         mixture.log_weights,
@@ -103,14 +127,22 @@ def merge_all(
         out.means[target],
         out.covs[target],
     )
+    if out.log_class_probs.shape[1] > 0:
+        merge_classes(mixture.log_class_probs, components, weights, count, out.log_class_probs[target])
 
 
 # From Python, on arrays of the library's own.
 
 
-def components_of(log_weights: Floats, means: Floats, covs: Floats) -> Mixture:
-    """New components of these weights and moments."""
-    return Mixture(log_weights, means, covs)
+def components_of(log_weights: Floats, means: Floats, covs: Floats, log_class_probs: Floats | None = None) -> Mixture:
+    """New components of these weights, moments and class probabilities; None: without classes."""
+    classes = np.empty((len(log_weights), 0)) if log_class_probs is None else log_class_probs
+    return Mixture(log_weights, means, covs, classes)
+
+
+def without_classes(mixture: Mixture) -> Mixture:
+    """The same components, of unknown class."""
+    return components_of(mixture.log_weights, mixture.means, mixture.covs)
 
 
 def taken_components(mixture: Mixture, places: Ints) -> Mixture:

@@ -10,8 +10,8 @@ from vedette.errors import ModelError
 from vedette.kernels.base.compile import borrowing, inlined, kernel
 from vedette.kernels.base.types import Floats, Ints, Mixture, Motion
 from vedette.kernels.gaussian.components import (
+    components_like,
     copy_component,
-    make_components,
     merge_components,
     own_components,
     stacked_mixtures,
@@ -37,7 +37,7 @@ def predicted_intensity(intensity: Mixture, motion: Motion, dt: float, born: Mix
 def moved(intensity: Mixture, motion: Motion, dt: float) -> Mixture:
     """Survival and motion over `dt` seconds, component by component."""
     num, dim = intensity.means.shape
-    out, scratch = make_components(num, dim), make_scratch(dim, 1)
+    out, scratch = components_like(intensity, num), make_scratch(dim, 1)
     for c in range(num):
         survival = motion.prob_survival(intensity.means[c], dt, motion.survival_params)
         if not 0.0 <= survival <= 1.0:
@@ -98,7 +98,7 @@ def _merged(mixture: Mixture, reach: float) -> Mixture:
     num, dim = mixture.means.shape
     left, near, weights = np.ones(num, np.int64), np.empty(num, np.int64), np.empty(num)
     inverse, factor = np.empty((dim, dim)), np.empty((dim, dim))
-    out, filled = make_components(num, dim), 0
+    out, filled = components_like(mixture, num), 0
     for heaviest in descending_order(mixture.log_weights):
         if left[heaviest] == 0:
             continue

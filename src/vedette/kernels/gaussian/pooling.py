@@ -10,9 +10,9 @@ import numpy as np
 from vedette.kernels.base.compile import borrowing, inlined, kernel
 from vedette.kernels.base.types import Floats, Ints, Mixture, Tracks
 from vedette.kernels.gaussian.components import (
+    components_like,
     copy_component,
     copy_gaussian,
-    make_components,
     merge_components,
     own_components,
 )
@@ -94,7 +94,7 @@ def pooled_tracks(
     tracks: Tracks, labels: Ints, pool_offsets: Ints, pool: Ints, weights: Floats, caps: MixtureCaps
 ) -> Tracks:
     """One track for each pool of tracks: the mixture of the pool under its linear weights, reduced."""
-    num, n, used, largest, room = len(labels), tracks.components.means.shape[1], 0, 0, 0
+    num, used, largest, room = len(labels), 0, 0, 0
     for i in range(num):
         size = 0
         for p in range(pool_offsets[i], pool_offsets[i + 1]):
@@ -102,8 +102,8 @@ def pooled_tracks(
         largest = max(largest, size)
         room += min(size, caps.max_components)
     components, component_weights = np.empty(largest, np.int64), np.empty(largest)
-    wide, work = make_components(largest, n), make_reduction_work(largest, n)
-    offsets, out, given = np.zeros(num + 1, np.int64), make_components(room, n), tracks.components
+    wide, work = components_like(tracks.components, largest), make_reduction_work(largest, tracks.components)
+    offsets, out, given = np.zeros(num + 1, np.int64), components_like(tracks.components, room), tracks.components
     for i in range(num):
         count = _gather(tracks, pool, weights, pool_offsets[i], pool_offsets[i + 1], components, component_weights)
         if caps.max_components == 1 or count == 1:

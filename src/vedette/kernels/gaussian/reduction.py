@@ -11,8 +11,8 @@ from vedette.kernels.base.compile import borrowing, kernel
 from vedette.kernels.base.types import Floats, Ints, Mixture
 from vedette.kernels.gaussian.components import (
     components_between,
+    components_like,
     copy_component,
-    make_components,
     merge_all,
     merge_components,
 )
@@ -42,15 +42,16 @@ class ReductionWork(NamedTuple):
 
 
 @kernel
-def make_reduction_work(num: int, state_dim: int) -> ReductionWork:
-    """Work arrays for mixtures of up to `num` components."""
+def make_reduction_work(num: int, like: Mixture) -> ReductionWork:
+    """Work arrays for mixtures of up to `num` components. like: components with the same columns."""
+    state_dim = like.means.shape[1]
     return ReductionWork(
         np.empty(num),
         np.empty(num, np.int64),
         np.empty(num, np.int64),
         np.empty(num, np.int64),
         np.empty(num),
-        make_components(num, state_dim),
+        components_like(like, num),
         np.empty((state_dim, state_dim)),
         np.empty(state_dim),
     )
@@ -138,8 +139,8 @@ def reduce_into(wide: Mixture, width: int, caps: MixtureCaps, work: ReductionWor
 @kernel
 def reduce_mixture(mixture: Mixture, caps: MixtureCaps) -> Mixture:
     """The reduced mixture, see `reduce_into`, in new arrays."""
-    num, n = mixture.means.shape
+    num = len(mixture.log_weights)
     most = min(num, max(1, caps.max_components))
-    out = make_components(most, n)
-    last = reduce_into(mixture, num, caps, make_reduction_work(num, n), out, 0)
+    out = components_like(mixture, most)
+    last = reduce_into(mixture, num, caps, make_reduction_work(num, mixture), out, 0)
     return components_between(out, 0, last)

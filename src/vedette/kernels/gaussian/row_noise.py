@@ -2,10 +2,13 @@
 
 The rows of such a scan are longer than a measurement of m components: behind these stand the lower triangle of the
 covariance of the row's noise, row by row, and the log likelihood ratio of its features (target over clutter), such as
-a signal-to-noise ratio. A variance of 0 leaves the component to the sensor's noise model. One below 0 is minus a
-variance that is added to that of the noise model, such as the error of the sensor's own pose. With a variance of
-`MISSING` a component was not measured; the likelihood ratio then makes up for the density of so wide a Gaussian, and
-clutter has the density of the other components.
+a signal-to-noise ratio. If targets have classes, one further log likelihood ratio for each class may follow, of
+features that differ between them.
+
+A variance of 0 leaves the component to the sensor's noise model. One below 0 is minus a variance that is added to that
+of the noise model, such as the error of the sensor's own pose. With a variance of `MISSING` a component was not
+measured; the likelihood ratio then makes up for the density of so wide a Gaussian, and clutter has the density of the
+other components.
 """
 
 from __future__ import annotations
@@ -16,9 +19,16 @@ from vedette.kernels.base.types import Floats
 MISSING = 1e16  # variance of a component that was not measured, SI: far above that of any state
 
 
+@inlined
 def row_length(meas_dim: int) -> int:
-    """Return the length of a row with noise and likelihood ratio."""
-    return meas_dim + meas_dim * (meas_dim + 1) // 2 + 1
+    """Return the length of a row with noise and likelihood ratio, without ratios of classes."""
+    return int(meas_dim + meas_dim * (meas_dim + 1) // 2 + 1)
+
+
+@inlined
+def num_class_ratios(length: int, meas_dim: int) -> int:
+    """Return the number of likelihood ratios of classes in a row of this length."""
+    return max(length - row_length(meas_dim), 0)
 
 
 @inlined
@@ -64,4 +74,4 @@ def replace_noise(measurement: Floats, noise: Floats) -> None:
 @inlined
 def log_likelihood_ratio(measurement: Floats, meas_dim: int) -> float:
     """Return the log likelihood ratio of a measurement's features; 0 without any."""
-    return measurement[-1] if has_own_noise(measurement, meas_dim) else 0.0
+    return measurement[row_length(meas_dim) - 1] if has_own_noise(measurement, meas_dim) else 0.0

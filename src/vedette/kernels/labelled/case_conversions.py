@@ -53,7 +53,7 @@ def glmb_cases_to_lmb(
     order; a label without any set in a case gets logit -inf there, and no Gaussian.
     """
     num = len(members)
-    offsets, components = np.arange(num + 1), make_components(num, cases.means.shape[2])
+    offsets, components = np.arange(num + 1), make_components(num, cases.means.shape[2], 0)
     tracks, caps = Tracks(members, offsets, components), MixtureCaps(-math.inf, 0.0, 1)
     components.log_weights[:] = 0.0
     for case in range(first, last):

@@ -9,7 +9,7 @@ import numpy as np
 from vedette.kernels.base.arrays import filled_ints, grown_floats, grown_ints
 from vedette.kernels.base.compile import borrowing, inlined, kernel
 from vedette.kernels.base.types import FactoredGlmb, Floats, Glmb, Ints, Mixture, Tracks
-from vedette.kernels.gaussian.components import copy_components, grown_components, make_components, own_components
+from vedette.kernels.gaussian.components import components_like, copy_components, grown_components, own_components
 from vedette.kernels.gaussian.linalg import log_add, log_sum
 from vedette.kernels.gaussian.mixtures import descending_order
 from vedette.kernels.labelled.groups import group_log_sums
@@ -34,13 +34,16 @@ class FactorStore(NamedTuple):
 
 
 @kernel
-def make_store(num_tracks: int, num_components: int, state_dim: int) -> FactorStore:
-    """Return an empty store with room for this number of tracks, each its own factor."""
+def make_store(num_tracks: int, num_components: int, like: Mixture) -> FactorStore:
+    """Return an empty store with room for this number of tracks, each its own factor.
+
+    like: components with the same columns.
+    """
     return FactorStore(
         np.zeros(5, np.int64),
         np.empty(2 * num_tracks, np.int64),
         np.zeros(num_tracks + 1, np.int64),
-        make_components(num_components, state_dim),
+        components_like(like, num_components),
         np.zeros(num_tracks + 1, np.int64),
         np.zeros(2 * num_tracks + 1, np.int64),
         np.empty(num_tracks, np.int64),

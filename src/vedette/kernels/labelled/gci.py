@@ -15,7 +15,8 @@ import numpy as np
 
 from vedette.kernels.base.compile import kernel
 from vedette.kernels.base.types import Floats, Ints, Mixture, Tracks
-from vedette.kernels.gaussian.components import make_components
+from vedette.kernels.gaussian.classes import normalise_classes
+from vedette.kernels.gaussian.components import components_like
 from vedette.kernels.gaussian.information import log_integral, log_value, row_size, to_information, to_moments
 from vedette.kernels.gaussian.linalg import cholesky, log_add, normalise_logs
 from vedette.kernels.gaussian.mixtures import require_gaussians
@@ -28,6 +29,7 @@ class Powers(NamedTuple):
 
     rows: Floats  # (num_components, row_size) information rows of N^w about `reference`
     log_weights: Floats  # (num_components,) w log a of each
+    log_class_probs: Floats  # (num_components, num_classes) w log p of each
     starts: Ints  # (num_sensors + 1,) start of the components of each sensor
     weights: Floats  # (num_sensors,) the powers w; 0 if the label is unknown
     reference: Floats  # (state_dim,) near the densities, to limit cancellation
@@ -38,11 +40,13 @@ class Powers(NamedTuple):
 
 
 @kernel
-def _make_powers(num_sensors: int, most: int, dim: int) -> Powers:
+def _make_powers(num_sensors: int, most: int, like: Mixture) -> Powers:
+    dim, num_classes = like.means.shape[1], like.log_class_probs.shape[1]
     size = row_size(dim)
     return Powers(
         np.empty((most, size)),
         np.empty(most),
+        np.empty((most, num_classes)),
         np.zeros(num_sensors + 1, np.int64),
         np.empty(num_sensors),
         np.empty(dim),
@@ -78,16 +82,19 @@ def _load(chosen: Ints, item: int, fusion_weights: Floats, tracks: Tracks, power
             if not to_information(mean, cov, powers.reference, weight, row, factor, matrix):
                 raise FloatingPointError("covariance of a track is not positive definite")
             powers.log_weights[used] = weight * components.log_weights[c]
+            for k in range(powers.log_class_probs.shape[1]):
+                powers.log_class_probs[used, k] = weight * components.log_class_probs[c, k]
             used += 1
         powers.starts[s + 1] = used
 
 
 @kernel
 def _multiply(powers: Powers, low: int, high: int, out: Mixture) -> None:
-    """Write one Gaussian for every combination of one component per sensor: its log mass and its moments."""
+    """Write the product of every combination of one component per sensor: log mass, moments, class probabilities."""
     dim, row = len(powers.reference), powers.row
     for combination in range(low, high):
         rest, total = combination - low, 0.0
+        out.log_class_probs[combination] = 0.0
         for k in range(len(row)):
             row[k] = 0.0
         for s in range(len(powers.weights)):
@@ -100,7 +107,10 @@ def _multiply(powers: Powers, low: int, high: int, out: Mixture) -> None:
             total += powers.log_weights[component]
             for k in range(len(row)):
                 row[k] += powers.rows[component, k]
+            for k in range(powers.log_class_probs.shape[1]):
+                out.log_class_probs[combination, k] += powers.log_class_probs[component, k]
         positive = to_moments(row, powers.reference, out.means[combination], out.covs[combination], powers.factor)
+        total += normalise_classes(out.log_class_probs[combination])
         out.log_weights[combination] = total + log_integral(row, dim)
         if not positive or math.isnan(out.log_weights[combination]):
             raise FloatingPointError("the product of the track densities of a label is not integrable")
@@ -179,15 +189,15 @@ def fuse_tracks(
     sensors' weights are scaled to sum to one. fusion_weights: (num, S) positive if known. points: (num_points, dim),
     point_weights: (num_points,) a cubature rule for the standard normal without negative weights; with no points the
     fused mixture is the component-wise power. A fused mixture has a component for every combination of the sensors'
-    components.
+    components. The points take the classes of a mixture as independent of its states.
 
     Returns offsets (num + 1,) and components of the fused tracks, and log_overlaps (num,). Raises FloatingPointError
     if a covariance is not positive definite, NumericalError if a fused one is not.
     """
-    num, dim = len(chosen), tracks.components.means.shape[1]
+    num = len(chosen)
     offsets, most = _count_combinations(chosen, tracks)
-    powers, log_overlaps = _make_powers(fusion_weights.shape[1], most, dim), np.empty(num)
-    out = make_components(offsets[num], dim)
+    powers, log_overlaps = _make_powers(fusion_weights.shape[1], most, tracks.components), np.empty(num)
+    out = components_like(tracks.components, offsets[num])
     for item in range(num):
         low, high = offsets[item], offsets[item + 1]
         _load(chosen, item, fusion_weights, tracks, powers)

@@ -8,7 +8,7 @@ import numpy as np
 
 from vedette.kernels.base.compile import kernel
 from vedette.kernels.base.types import Glmb, Ints, Tracks
-from vedette.kernels.gaussian.components import copy_components, joined_components, make_components, stacked_mixtures
+from vedette.kernels.gaussian.components import components_like, copy_components, joined_components, stacked_mixtures
 
 
 def join_offsets(offsets: Sequence[Ints]) -> Ints:
@@ -50,7 +50,7 @@ def taken_tracks(tracks: Tracks, places: Ints) -> Tracks:
     for i in range(num):
         labels[i, 0], labels[i, 1] = tracks.labels[places[i], 0], tracks.labels[places[i], 1]
         offsets[i + 1] = offsets[i] + tracks.offsets[places[i] + 1] - tracks.offsets[places[i]]
-    components = make_components(offsets[num], given.means.shape[1])
+    components = components_like(given, offsets[num])
     for i in range(num):
         copy_components(given, tracks.offsets[places[i]], tracks.offsets[places[i] + 1], components, offsets[i])
     return Tracks(labels, offsets, components)

@@ -65,17 +65,21 @@ def _is_gaussian(mean: Floats, cov: Floats, factor: Floats) -> bool:
 @kernel
 def _are_mixtures(tracks: Tracks) -> bool:
     """Return True if every track is a density."""
-    log_weights, means, covs = tracks.components
+    log_weights, means, covs, classes = tracks.components
     num, (num_components, dim) = len(tracks.labels), means.shape
     if tracks.labels.shape[1] != 2 or dim == 0 or len(log_weights) != num_components:
         return False
-    if covs.shape != (num_components, dim, dim) or not _cuts(tracks.offsets, num, num_components, 1):
+    if covs.shape != (num_components, dim, dim) or len(classes) != num_components:
+        return False
+    if not _cuts(tracks.offsets, num, num_components, 1):
         return False
     factor = np.empty((dim, dim))
     for i in range(num_components):
         if not _is_gaussian(means[i], covs[i], factor):
             return False
     are_normalised = True
+    for i in range(num_components if classes.shape[1] > 0 else 0):
+        are_normalised &= _sum_to_one(classes[i])
     for track in range(num):
         are_normalised &= _sum_to_one(log_weights[tracks.offsets[track] : tracks.offsets[track + 1]])
     return are_normalised

@@ -64,7 +64,7 @@ def has_rows(work: GlmbWork, num: int) -> bool:
 
 @kernel
 def _make_belief(num_tracks: int, num_hyps: int, num_entries: int, dim: int) -> CaseBelief:
-    room = make_components(num_tracks, dim)
+    room = make_components(num_tracks, dim, 0)
     tracks = Tracks(np.empty((num_tracks, 2), np.int64), np.empty(num_tracks + 1, np.int64), room)
     hyps = Parents(np.empty(num_hyps + 1, np.int64), np.empty(num_entries, np.int64), np.empty(num_hyps))
     return CaseBelief(tracks, hyps, np.empty(num_hyps, np.int64))
@@ -93,7 +93,7 @@ def grown_work(work: GlmbWork) -> GlmbWork:
     rows, options, num = work.rows, work.options, work.needed[0]
     # Doubled, because a longer horizon will need still more tracks.
     if not has_rows(work, num):
-        rows = make_rows(2 * num, 2 * num, dim, meas_dim)
+        rows = make_rows(2 * num, 2 * num, rows.components, meas_dim)
         options = make_options(2 * num, 2 * num, most_measurements, dim, meas_dim)
     children = grown_children(work.children, work.search.sizes[WIDEST])
     num_options, num_hyps, num_entries = len(options.columns), len(children.parents), len(children.options)
@@ -124,13 +124,14 @@ def grown_work(work: GlmbWork) -> GlmbWork:
 def make_work(num_tracks: int, num_sets: int, dim: int, meas_dim: int, most_measurements: int) -> GlmbWork:
     """Return arrays for the start, with the sizes of a prior with `num_tracks` tracks and `num_sets` label sets."""
     none, belief = np.empty(0, np.int64), _make_belief(0, 0, 0, dim)
+    like = belief.tracks.components
     work = GlmbWork(
         filled_ints(1, 2 * num_tracks),
         make_pair_work(dim, meas_dim),
         np.empty((most_measurements, meas_dim)),
         np.empty(most_measurements),
-        make_rows(num_tracks, num_tracks, dim, meas_dim),
-        make_rows(0, 0, dim, meas_dim),
+        make_rows(num_tracks, num_tracks, like, meas_dim),
+        make_rows(0, 0, like, meas_dim),
         all_measurements(),
         make_options(0, 0, most_measurements, dim, meas_dim),
         make_search(0),

@@ -58,7 +58,7 @@ class LmbWork(NamedTuple):
 def _make_work(prior: Lmb, meas_dim: int, most_measurements: int) -> LmbWork:
     num, dim = prior.tracks.components.means.shape
     options = make_options(num, num, most_measurements, dim, meas_dim)
-    room = make_components(num, dim)
+    room = make_components(num, dim, 0)
     for c in range(num):
         room.log_weights[c] = prior.tracks.components.log_weights[c]
     tracks = Tracks(prior.tracks.labels, prior.tracks.offsets, room)
@@ -66,8 +66,8 @@ def _make_work(prior: Lmb, meas_dim: int, most_measurements: int) -> LmbWork:
         make_pair_work(dim, meas_dim),
         np.empty((most_measurements, meas_dim)),
         np.empty(most_measurements),
-        make_rows(num, num, dim, meas_dim),
-        make_rows(num, num, dim, meas_dim),
+        make_rows(num, num, room, meas_dim),
+        make_rows(num, num, room, meas_dim),
         all_measurements(),
         options,
         np.empty(len(options.columns)),

@@ -12,7 +12,7 @@ from vedette.kernels.association.children import Children, Parents
 from vedette.kernels.association.predicted import Rows
 from vedette.kernels.base.compile import borrowing, inlined, kernel
 from vedette.kernels.base.types import Glmb, Ints, Mixture, Tracks
-from vedette.kernels.gaussian.components import components_between, copy_component, copy_gaussian, make_components
+from vedette.kernels.gaussian.components import components_between, components_like, copy_component, copy_gaussian
 from vedette.kernels.gaussian.innovation import update_mean
 from vedette.kernels.gaussian.linalg import normalise_logs
 from vedette.kernels.gaussian.relinearisation import copy_updated
@@ -51,6 +51,9 @@ def write_updated(row: int, option: int, rows: Rows, options: Options, start: in
         elif detected:
             copy_gaussian(predicted.means, rows.innovation.covs, c, out.means, out.covs, start)
             update_mean(rows.innovation, c, options.whitened[entry + i], predicted.means[c], out.means[start])
+        if detected:
+            for k in range(min(options.log_class_probs.shape[1], out.log_class_probs.shape[1])):
+                out.log_class_probs[start, k] = options.log_class_probs[entry + i, k]
         start += 1
     return start
 
@@ -121,7 +124,7 @@ def assemble(
         row = members[naming.rows[i]]
         naming.rows[i] = row
         most += rows.offsets[row + 1] - rows.offsets[row]
-    room = make_components(most, rows.components.means.shape[1])
+    room = components_like(rows.components, most)
     tracks = Tracks(np.empty((num, 2), np.int64), np.empty(num + 1, np.int64), room)
     last = update_tracks(naming, num, rows, options, tracks)
     trimmed = Tracks(tracks.labels, tracks.offsets, components_between(room, 0, last))

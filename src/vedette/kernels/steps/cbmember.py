@@ -17,7 +17,7 @@ from vedette.kernels.association.truncation import Truncation
 from vedette.kernels.base.arrays import group_members
 from vedette.kernels.base.compile import kernel
 from vedette.kernels.base.types import Floats, Ints, Lmb, Motion, ScanInput, Sensor, Tracks
-from vedette.kernels.gaussian.components import components_between, make_components
+from vedette.kernels.gaussian.components import components_between, components_like
 from vedette.kernels.gaussian.linalg import log_add
 from vedette.kernels.gaussian.mixtures import require_gaussians
 from vedette.kernels.gaussian.reduction import MixtureCaps, make_reduction_work
@@ -118,10 +118,11 @@ def posterior_mixtures(sources: Ints, rows: Rows, options: Options, choices: Cho
 
     That is the mixture of a missed row, or of all rows that explain a measurement, weighted by their existence odds.
     """
-    num_rows, dim = len(rows.log_absent), rows.components.means.shape[1]
+    num_rows = len(rows.log_absent)
     widest, total = _most_components(sources, rows, choices)
     offsets, labels = np.zeros(len(sources) + 1, np.int64), np.full((len(sources), 2), -1, np.int64)
-    out, wide, work = make_components(total, dim), make_components(widest, dim), make_reduction_work(widest, dim)
+    out, wide = components_like(rows.components, total), components_like(rows.components, widest)
+    work = make_reduction_work(widest, rows.components)
     filled = 0
     for k in range(len(sources)):
         width, source = 0, sources[k]

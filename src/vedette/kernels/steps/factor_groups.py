@@ -165,8 +165,17 @@ def _taken_options(options: Options, members: Ints, columns: Ints) -> tuple[Opti
         offsets[i + 1] = filled
     for k in range(num_columns):
         columns[measurements[k]] = -1
-    weights, whitened = options.component_log_weights, options.whitened
-    taken = Options(offsets, own, log_weights, entries, weights, whitened, options.updated, num_columns)
+    taken = Options(
+        offsets,
+        own,
+        log_weights,
+        entries,
+        options.component_log_weights,
+        options.whitened,
+        options.updated,
+        options.log_class_probs,
+        num_columns,
+    )
     return taken, measurements[:num_columns]
 
 

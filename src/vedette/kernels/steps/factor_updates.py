@@ -17,7 +17,7 @@ from vedette.kernels.association.truncation import Truncation
 from vedette.kernels.base.arrays import filled_ints
 from vedette.kernels.base.compile import borrowing, kernel
 from vedette.kernels.base.types import Floats, Glmb, Ints, Mixture
-from vedette.kernels.gaussian.components import components_between, copy_component, make_components
+from vedette.kernels.gaussian.components import components_between, components_like, copy_component
 from vedette.kernels.gaussian.distances import reduction_bound
 from vedette.kernels.gaussian.linalg import log_add, log_sum
 from vedette.kernels.gaussian.reduction import MixtureCaps, ReductionWork, make_reduction_work, reduce_into
@@ -74,19 +74,19 @@ class Work(NamedTuple):
 
 @kernel
 def make_work(rows: Rows, options: Options) -> Work:
-    widest, dim = 0, rows.components.means.shape[1]
+    widest = 0
     for row in range(len(rows.log_absent)):
         num_options = options.offsets[row + 1] - options.offsets[row]
         widest = max(widest, (rows.offsets[row + 1] - rows.offsets[row]) * max(1, num_options))
     return Work(
         np.empty(options.offsets[-1]),
-        make_components(widest, dim),
+        components_like(rows.components, widest),
         np.empty(len(rows.log_absent), np.int64),
         filled_ints(options.num_measurements, -1),
         np.zeros(options.num_measurements),
         np.zeros(_NUM_SUMS),
-        make_reduction_work(widest, dim),
-        make_components(len(rows.log_absent), dim),
+        make_reduction_work(widest, rows.components),
+        components_like(rows.components, len(rows.log_absent)),
         np.zeros(1, np.int64),
     )
 
@@ -218,8 +218,8 @@ def _append_label(
         else:
             log_versions[track] = log_add(log_versions[track], glmb.hyp_log_weights[h])
     components = tracks.components
-    num, dim = components.means.shape
-    wide, width, reducing = make_components(num, dim), 0, make_reduction_work(num, dim)
+    num = len(components.log_weights)
+    wide, width, reducing = components_like(components, num), 0, make_reduction_work(num, components)
     for track in range(len(log_versions)):
         if log_versions[track] == -math.inf:
             continue

@@ -149,7 +149,7 @@ def _update_groups(
     offsets, members = group_members(leaders, len(leaders))
     work, ranking, most_labels = make_work(rows, options), make_ranking(), 0
     widest = len(work.wide.log_weights)
-    store = make_store(len(rows.log_absent), 2 * len(rows.components.log_weights), rows.components.means.shape[1])
+    store = make_store(len(rows.log_absent), 2 * len(rows.components.log_weights), rows.components)
     for leader in range(len(leaders)):
         together = members[offsets[leader] : offsets[leader + 1]]
         if len(together) == 0 or factors.num_labels[leader] == 0:

@@ -14,7 +14,8 @@ from vedette.kernels.association.options import log_clutter_at
 from vedette.kernels.association.truncation import Truncation
 from vedette.kernels.base.compile import inlined, kernel
 from vedette.kernels.base.types import Bools, Ints, Lmb, ScanInput, Sensor, Tracks
-from vedette.kernels.gaussian.components import components_between, copy_components, make_components
+from vedette.kernels.gaussian.classes import largest_class_ratio
+from vedette.kernels.gaussian.components import components_between, components_like, copy_components
 from vedette.kernels.gaussian.detection import detection_probability
 from vedette.kernels.gaussian.linalg import LOG_2PI, cholesky, log_det_from_factor, normalise_logs
 from vedette.kernels.gaussian.reduction import MixtureCaps, reduce_mixture
@@ -25,10 +26,12 @@ _NOTHING = 2.0**-54  # negligible next to 1
 
 @kernel
 def _least_log_clutter(scan: ScanInput, sensor: Sensor, floor: float) -> float:
-    """Return the least log clutter intensity at the measurements; inf if there are none."""
+    """Return the least log clutter intensity at the measurements over the ratio of classes; inf if there are none."""
     least = math.inf
     for j in range(len(scan.measurements)):
-        least = min(least, max(log_clutter_at(sensor, scan.measurements[j], scan.pose), floor))
+        measurement = scan.measurements[j]
+        level = max(log_clutter_at(sensor, measurement, scan.pose), floor)
+        least = min(least, level - largest_class_ratio(measurement, len(sensor.periods)))
     return least
 
 
@@ -76,7 +79,7 @@ def marked(lmb: Lmb, marks: Bools) -> Lmb:
         if marks[i]:
             num += 1
             num_components += lmb.tracks.offsets[i + 1] - lmb.tracks.offsets[i]
-    room, logits, filled = make_components(num_components, lmb.tracks.components.means.shape[1]), np.empty(num), 0
+    room, logits, filled = components_like(lmb.tracks.components, num_components), np.empty(num), 0
     out = Tracks(np.empty((num, 2), np.int64), np.zeros(num + 1, np.int64), room)
     for i in range(len(marks)):
         if marks[i]:
@@ -115,8 +118,8 @@ def merge_updated(prior: Lmb, marks: Bools, updated: Lmb, caps: MixtureCaps, set
     Mixtures of the other tracks are reduced as by an update without effect, which may merge results of the last one.
     The `settled` tracks, whose reduction has no effect, are skipped. Also returns the tracks that are settled now.
     """
-    most, dim = len(marks), prior.tracks.components.means.shape[1]
-    room = make_components(len(prior.tracks.components.log_weights) + len(updated.tracks.components.log_weights), dim)
+    most, own_components = len(marks), prior.tracks.components
+    room = components_like(own_components, len(own_components.log_weights) + len(updated.tracks.components.log_weights))
     logits, still, num, own = np.empty(most), np.zeros(most, np.bool_), 0, 0
     out = Tracks(np.empty((most, 2), np.int64), np.zeros(most + 1, np.int64), room)
     for i in range(most):

@@ -77,7 +77,8 @@ def predict_combinations(prior: Lmb, scan: ScanInput, num_sensors: int, motion: 
     birth = scan.birth
     num_tracks, num_births = len(prior.tracks.labels), len(birth.tracks.labels)
     num, dim = num_tracks + num_births, prior.tracks.components.means.shape[1]
-    rows = make_rows(num, len(prior.tracks.components.log_weights) + len(birth.tracks.components.log_weights), dim, 0)
+    own = prior.tracks.components
+    rows = make_rows(num, len(own.log_weights) + len(birth.tracks.components.log_weights), own, 0)
     fill_survivors(prior.tracks, motion, scan.dt, rows, make_scratch(dim, 0))
     fill_births(birth, num_tracks, rows)
     return _one_each(prior, rows, num_sensors)
@@ -123,7 +124,7 @@ def _taken(combinations: Combinations, rows: Rows, options: Options, kept: Ints,
             num += kept[option]
             num_components += kept[option] * (rows.offsets[i + 1] - rows.offsets[i])
     columns, tracks = np.empty((num, combinations.columns.shape[1]), np.int64), np.empty(num, np.int64)
-    grown = make_rows(num, num_components, rows.components.means.shape[1], 0)
+    grown = make_rows(num, num_components, rows.components, 0)
     updated, filled, end = grown.components, 0, 0
     for i in range(len(combinations.tracks)):
         for option in range(options.offsets[i], options.offsets[i + 1]):

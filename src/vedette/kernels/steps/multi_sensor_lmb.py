@@ -11,7 +11,7 @@ from vedette.kernels.association.predicted import Rows
 from vedette.kernels.association.truncation import Truncation
 from vedette.kernels.base.compile import kernel
 from vedette.kernels.base.types import Floats, Ints, Lmb, ScanInput, Sensor, Tracks
-from vedette.kernels.gaussian.components import components_between, copy_component, make_components
+from vedette.kernels.gaussian.components import components_between, components_like, copy_component
 from vedette.kernels.gaussian.linalg import log_add, log_sum
 from vedette.kernels.gaussian.mixtures import require_gaussians
 from vedette.kernels.gaussian.reduction import MixtureCaps, make_reduction_work
@@ -84,10 +84,10 @@ def _reduced_tracks(
 ) -> Tracks:
     """Return each chosen track's mixture over its combinations, reduced."""
     components = rows.components
-    dim = components.means.shape[1]
     widest, total = _widths(chosen, rows, choices, sources)
     labels, offsets = np.empty((len(chosen), 2), np.int64), np.zeros(len(chosen) + 1, np.int64)
-    out, wide, work = make_components(total, dim), make_components(widest, dim), make_reduction_work(widest, dim)
+    out, wide = components_like(components, total), components_like(components, widest)
+    work = make_reduction_work(widest, components)
     filled = 0
     for i in range(len(chosen)):
         width = 0

@@ -17,7 +17,7 @@ from vedette.kernels.association.predicted import Rows, rows_of_scan
 from vedette.kernels.association.truncation import Truncation
 from vedette.kernels.base.compile import kernel
 from vedette.kernels.base.types import Floats, Mixture, Motion, ScanInput, Sensor, Tracks
-from vedette.kernels.gaussian.components import make_components
+from vedette.kernels.gaussian.components import components_like
 from vedette.kernels.gaussian.linalg import log_add
 from vedette.kernels.gaussian.mixtures import require_gaussians
 from vedette.kernels.gaussian.reduction import MixtureCaps, reduce_mixture
@@ -59,14 +59,14 @@ def corrected_intensity(rows: Rows, options: Options, log_factors: Floats, caps:
     log_factors: (>= num_options,) log of the factor of each option.
     """
     num_options = options.offsets[1]
-    num_components, dim = rows.components.means.shape
+    num_components = len(rows.components.log_weights)
     filled = 0
     for option in range(num_options):
         entry = options.entries[option]
         for i in range(entry, entry + num_components):
             if options.component_log_weights[i] > -math.inf:
                 filled += 1
-    wide, start = make_components(filled, dim), 0
+    wide, start = components_like(rows.components, filled), 0
     for option in range(num_options):
         end = write_updated(0, option, rows, options, start, wide)
         for c in range(start, end):
