@@ -103,6 +103,7 @@ SHOWN = {
     "docs/searches.md": ["of 65 joint actions evaluated"],
     "docs/signatures.md": ["500."],
     "docs/stonesoup.md": ["targets, ", "looks along 30 degrees; the ship is at 33"],
+    "docs/target-classes.md": ["[-1.18  0.96]"],
     "docs/tutorial.md": ["best: sensor 1 goes east and sensor 2 north", "Plan of jdm for 2 sensors"],
     "docs/undetected-targets.md": ["scan 20: 2.96 not yet found, "],
     "examples/cameras.py": ["jdm     OSPA", "100%"],

@@ -89,7 +89,7 @@ BAD: list[tuple[bytes, str]] = [
     (b'{"sensor": 1, "time": 2}', "line 3, measurements: expected it in every line; got none"),
     (
         line(1, 2.0, [], speed=3),
-        "times, stds, snr_db, pose_stds; got 'speed'",
+        "times, stds, snr_db, class, size_m, pose_stds; got 'speed'",
     ),
     (line("radar", 2.0), "line 3, sensor: expected one of 'sensor 1', 'sensor 2', or its number from 1; got 'radar'"),
     (line(0, 2.0), "or its number from 1; got 0"),

@@ -18,6 +18,7 @@ from vedette.evaluation.observation_history import (
 )
 from vedette.kernels.base.types import Floats, Ints, Mixture
 from vedette.kernels.gaussian.components import components_of, joined_components, taken_components
+from vedette.models import BirthModel
 
 # Estimates of a new label that are compared with the motion of an ended one: later ones add little information.
 _FIRST_ESTIMATES = 10
@@ -102,6 +103,9 @@ def gap_log_ratios(histories: Sequence[TrackHistory], observations: ObservationH
 
         ratio(i, j) = r P_S(n) U * integral p_i(x) L_j(x) dx / (G * (b + (1 - e) / e) * integral D(x) L_j(x) dx).
 
+    Classes of targets add the factor sum over k of c_i(k) c_j(k) / c(k), with the last class probabilities of both
+    labels, c_i and c_j, and those of any target, c.
+
     This is exact for linear Gaussian models and a probability of detection that is the same everywhere, if the first
     estimate of j is from the scan that began it. D is the default filter's intensity of targets that no scan has
     detected. L_j is the product of the information that each estimate of j adds to the previous one, predicted to its
@@ -149,7 +153,16 @@ def gap_log_ratios(histories: Sequence[TrackHistory], observations: ObservationH
         ended.keep(np.flatnonzero([scan - histories[i].steps[-1] < _LONGEST_GAP for i in ended.tracks]))
         for i in [i for i, history in enumerate(histories) if history.steps[-1] - 1 == scan]:
             ended.add(i, histories[i])
-    return ratios
+    return ratios + _log_class_ratios(histories, observations.targets.birth)
+
+
+def _log_class_ratios(histories: Sequence[TrackHistory], birth: BirthModel) -> Floats:
+    """Return the log of the factor of the classes in the ratio of each pair of labels, (num_labels, num_labels)."""
+    if birth.class_probs is None or not histories:
+        return np.zeros((len(histories), len(histories)))
+    probs = np.stack([history.class_probs[-1] for history in histories])
+    with np.errstate(divide="ignore"):
+        return np.asarray(np.log(probs @ (probs / birth.class_probs).T))
 
 
 def _estimate_information(

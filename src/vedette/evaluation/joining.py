@@ -112,4 +112,5 @@ def _relabel(estimate: Estimate, names: dict[Label, Label]) -> Estimate:
     labels = [names.get((step, index), (step, index)) for step, index in estimate.labels.tolist()]
     order = sorted(range(len(labels)), key=labels.__getitem__)
     relabelled = np.array(labels, np.int64).reshape(-1, 2)[order]
-    return Estimate(relabelled, estimate.means[order], estimate.covs[order], estimate.existence[order])
+    columns = estimate.means, estimate.covs, estimate.existence, estimate.class_probs
+    return Estimate(relabelled, *(column[order] for column in columns))

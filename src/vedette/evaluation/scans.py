@@ -138,7 +138,10 @@ def scan_table(record: RunRecord, scenario: Scenario) -> dict[str, list[Any]]:
             rows = (site.to_raw(scan.measurements, pose) if compass else scan.measurements).tolist() or [()]
             bearings = bearings_of(scan.measurements, pose, site.kind)
             beam_lags = lags(bearings, pose).tolist() if is_turn(pose) and len(bearings) else [0.0] * len(rows)
-            more = [dict[str, Any]() for _ in rows] if recording is None else _accuracy_cells(recording, k, s, columns)
+            reports = () if site.features is None else site.features.reports
+            more = [dict[str, Any]() for _ in rows]
+            if recording is not None:
+                more = _accuracy_cells(recording, k, s, columns, reports)
             for row, lag, own_accuracy in zip(rows, beam_lags, more or [{}], strict=True):
                 position = pose[:2] + lag * pose[OWN_VELOCITY:BEAM] if lag else pose[:2]
                 pose_cells = zip(pose_columns, (*position, heading, *pose[OWN_VELOCITY:]), strict=False)
@@ -160,16 +163,25 @@ def _accuracy_column(name: str) -> str:
     return f"{name}_{next(iter(UNITS[name]))}".rstrip("_")
 
 
-def _accuracy_cells(recording: RecordedScans, k: int, s: int, columns: Sequence[str]) -> list[dict[str, Any]]:
-    """Return for each row of a recorded scan its cells of accuracy, and None for components that were not measured."""
+def _accuracy_cells(
+    recording: RecordedScans, k: int, s: int, columns: Sequence[str], reports: Sequence[str]
+) -> list[dict[str, Any]]:
+    """Return for each row of a recorded scan its cells of accuracy, and None for components that were not measured.
+
+    reports: names of the classes that the sensor reports.
+    """
     scan, accuracy, dim = recording.scans[k][s], recording.accuracy[k][s], len(columns)
     assert scan is not None
     variances = np.diagonal(noise_of_rows(scan, np.zeros((len(scan), dim, dim))), axis1=1, axis2=2)
-    all_cells = [{columns[i]: None for i in np.flatnonzero(row >= MISSING).tolist()} for row in variances]
+    all_cells: list[dict[str, Any]] = [
+        {columns[i]: None for i in np.flatnonzero(row >= MISSING).tolist()} for row in variances
+    ]
     if accuracy is not None:
         names = [_accuracy_column(name) for name in recording.accuracy_columns[s]]
         for cells, values in zip(all_cells, accuracy.tolist(), strict=True):
             cells |= {name: None if isnan(value) else value for name, value in zip(names, values, strict=True)}
+            if cells.get("class") is not None:
+                cells["class"] = reports[int(cells["class"])]
     return all_cells
 
 

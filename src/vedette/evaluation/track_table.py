@@ -36,6 +36,7 @@ def track_table(
     compass: Compass | None = None,
     joins: Sequence[Join] = (),
     has_height: bool = False,
+    classes: Sequence[str] = (),
 ) -> dict[str, list[Any]]:
     """Return the estimates by columns, one row for each.
 
@@ -45,6 +46,8 @@ def track_table(
     or more; with `has_height` also `z_m`, `vz_mps`), `existence` is the existence probability. `lon_deg`, `lat_deg`
     need an origin; `course_deg`, clockwise from true north, and `speed_mps` need a compass. `target` is the name of the
     true target that OSPA's assignment gives it, nearer than `cutoff` (m), or None.
+
+    With `classes`, their names, `class` is the most probable one and `prob_...` the probability of each.
 
     names: of the true targets, by their ids; else `id + 1`. joins: see `vedette.evaluation.joining`.
     """
@@ -80,6 +83,10 @@ def track_table(
         courses = courses_of(compass, means.reshape(-1, dim))
         table["course_deg"], table["speed_mps"] = courses[:, 0].tolist(), courses[:, 1].tolist()
     table["existence"] = [row[4] for row in rows]
+    if classes:
+        probs = np.concatenate([estimate.class_probs for estimate in record.estimates])
+        table["class"] = [classes[k] for k in probs.argmax(axis=1).tolist()]
+        table |= {f"prob_{name}": probs[:, k].tolist() for k, name in enumerate(classes)}
     table["target"] = [_name(matched_targets.get((row[0], row[1])), names) for row in rows]
     return table
 
@@ -99,6 +106,7 @@ def table_of_run(record: RunRecord, scenario: Scenario, joins: Sequence[Join] = 
         compass=model.north() if model.by_compass else None,
         joins=joins,
         has_height=model.has_heights,
+        classes=tuple(model.classes),
     )
 
 
@@ -155,7 +163,7 @@ def _parquet(table: Mapping[str, Sequence[Any]]) -> bytes:
     import pyarrow as pa
     from pyarrow import parquet
 
-    texts = {"utc", "label", "track", "target", "sensor"}
+    texts = {"utc", "label", "track", "target", "sensor", "class"}
     arrays = {name: pa.array(cells, pa.string() if name in texts else pa.float64()) for name, cells in table.items()}
     content = io.BytesIO()
     parquet.write_table(pa.table(arrays), content, compression="zstd")

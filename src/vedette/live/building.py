@@ -70,5 +70,6 @@ def build_live_loop(
         decide_every=decide_every,
         max_lead=max_lead,
         seed=seed,
+        classes=tuple(model.classes),
         valid_area=box_of(model.region.build().corners),
     )

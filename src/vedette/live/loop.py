@@ -18,6 +18,7 @@ from vedette.internal.quantities import COMPONENTS, HEIGHT_DEPENDENT, PLACED
 from vedette.kernels.base.types import Floats
 from vedette.live.messages import Message, read_message
 from vedette.models.arguments import reject
+from vedette.models.row_noise import measured_part
 from vedette.platforms.compass import Compass, PlaneCompass, courses_of
 from vedette.recorded import Conventions, Origin, RecordedSensor
 from vedette.recorded.extents import beyond_reach, is_within, places_of
@@ -79,6 +80,7 @@ class LiveLoop:
         max_lead: s; a scan further ahead of all others is refused unless several in a row agree, because one wrong
             clock would otherwise end the window of all other sensors.
         seed: seed of the decisions.
+        classes: names of the classes of targets; () if they have none.
         valid_area: (2, 2) lower left and upper right corner of the area of valid measurements, in m; others are left
             out and counted in the answer as `beyond`. None: no limit.
     """
@@ -94,6 +96,7 @@ class LiveLoop:
     decide_every: float | None = None
     max_lead: float = 60.0
     seed: int = 0
+    classes: tuple[str, ...] = ()
     valid_area: Floats | None = None
 
     @property
@@ -142,10 +145,10 @@ class LiveLoop:
         site, pose = self.sites[scan.sensor], np.asarray(scan.pose)
         if self.valid_area is None or site.kind not in PLACED:
             return scan, 0
-        measured = np.asarray(scan.measurements, np.float64).reshape(-1, len(COMPONENTS[site.kind]))
-        places = places_of(measured, pose, site.kind)
+        rows = np.asarray(scan.measurements, np.float64)
+        places = places_of(measured_part(rows, len(COMPONENTS[site.kind])), pose, site.kind)
         inside = is_within(places, self.valid_area) & ~beyond_reach(places, pose[:2], site.reach)
-        return replace(scan, measurements=measured[inside]), int(np.count_nonzero(~inside))
+        return replace(scan, measurements=rows[inside]), int(np.count_nonzero(~inside))
 
     def _on_clock(self, state: LiveState, message: Message, place: str) -> tuple[LiveState, float]:
         """Return the state with the form and offset of times set, and the scan's time on the clock of the tracker.
@@ -188,6 +191,8 @@ class LiveLoop:
         ):
             components = dict(zip(names, mean, strict=False))
             tracks.append({"label": ".".join(map(str, label)), **components, "std": std, "existence": existence})
+        for track, probs in zip(tracks, estimate.class_probs.tolist() if self.classes else (), strict=False):
+            track["classes"] = dict(zip(self.classes, probs, strict=True))
         if self.origin is not None and tracks:
             for track, (lon, lat) in zip(tracks, self.origin.to_degrees(estimate.means[:, :2]).tolist(), strict=True):
                 track.update(lon=lon, lat=lat)

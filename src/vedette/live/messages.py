@@ -25,7 +25,8 @@ from vedette.tracking import SensorScan
 
 MAX_LINE_BYTES = 1_000_000  # per line
 MAX_MEASUREMENTS = 2000  # per scan
-_KEYS = ("sensor", "time", "measurements", "pose", "velocity", "times", "stds", "snr_db", "pose_stds")
+_REQUIRED = ("sensor", "time", "measurements")
+_KEYS = (*_REQUIRED, "pose", "velocity", "times", "stds", "snr_db", "class", "size_m", "pose_stds")
 
 
 def is_message(line: bytes) -> bool:
@@ -58,7 +59,8 @@ def read_message(
     velocity in m/s. For a sensor that turns, `"times"` has the time of each measurement, and `time` is the middle of
     the turn; without `"times"`, all measurements are of one time. `"stds"` has a row of standard deviations for each
     measurement, in its units, null where the sensor's noise model holds; `"snr_db"` the signal-to-noise ratio of each
-    measurement of a sensor with `signal`, or null. `"pose_stds"` has standard deviations of the pose, `{"x": , "y": ,
+    measurement of a sensor with `signal`, or null; `"class"` and `"size_m"` the reported class and the size of each,
+    for a sensor with `classification`, or null. `"pose_stds"` has standard deviations of the pose, `{"x": , "y": ,
     "heading_deg": , "height": , "vx": , "vy": }`, each optional.
 
     Args:
@@ -164,7 +166,7 @@ def _object(line: bytes, place: str) -> Mapping[str, Any]:
     for key in data:
         if key not in _KEYS:
             raise InputError(f"{place}: expected keys among {', '.join(_KEYS)}; got {shown(key)}")
-    for key in _KEYS[:3]:
+    for key in _REQUIRED:
         if key not in data:
             raise reject(f"{place}, {key}", "it in every line", "none")
     return data
@@ -194,7 +196,7 @@ def _rows(given: Any, field: str, site: RecordedSensor) -> list[list[float]]:
 
 
 def _accuracy(data: Mapping[str, Any], num: int, site: RecordedSensor, place: str) -> dict[str, list[Any]]:
-    """Return standard deviations and signal-to-noise ratios as columns of a table."""
+    """Return standard deviations, signal-to-noise ratios, classes and sizes as columns of a table."""
     names, found = COMPONENTS[site.kind], dict[str, list[Any]]()
     if (stds := data.get("stds")) is not None:
         wanted = f"for each of {pluralise(num, 'measurement')} [{', '.join(names)}], numbers above 0 or null"
@@ -205,14 +207,26 @@ def _accuracy(data: Mapping[str, Any], num: int, site: RecordedSensor, place: st
         ):
             raise reject(f"{place}, stds", wanted, stds)
         found |= {f"{name}_std": [row[j] for row in stds] or [None] for j, name in enumerate(names)}
-    if (ratios := data.get("snr_db")) is not None:
-        if site.signal is None:
-            raise reject(f"{place}, snr_db", f"none, as the sensors file gives no `signal` of {site.name}", "some")
-        numbers = isinstance(ratios, list) and all(each is None or _is_number(each) for each in ratios)
-        if not numbers or len(ratios) != num:
-            raise reject(f"{place}, snr_db", f"{pluralise(num, 'number')} or null, one for each measurement", ratios)
-        found["snr"] = ratios or [None]
+    features = site.features
+    for key, name, section, is_read, thing in (
+        ("snr_db", "snr", "signal", site.signal is not None, "number"),
+        ("size_m", "size", "classification", features is not None and bool(features.sizes), "number"),
+        ("class", "class", "classification", features is not None and bool(features.reports), "text"),
+    ):
+        if (cells := data.get(key)) is None:
+            continue
+        if not is_read:
+            raise reject(f"{place}, {key}", f"none, as the sensors file gives no `{section}` of {site.name}", "some")
+        is_valid = _is_number if thing == "number" else _is_text
+        are_valid = isinstance(cells, list) and all(each is None or is_valid(each) for each in cells)
+        if not are_valid or len(cells) != num:
+            raise reject(f"{place}, {key}", f"{pluralise(num, thing)} or null, one for each measurement", cells)
+        found[name] = cells or [None]
     return found
+
+
+def _is_text(value: object) -> bool:
+    return isinstance(value, str)
 
 
 def _pose(given: Any, field: str, site: RecordedSensor) -> tuple[dict[str, float], list[float]]:

@@ -70,7 +70,7 @@ class ScanColumns:
         return tuple(name for name in self.table.columns if name not in used)
 
     def _accuracy(self, site: RecordedSensor) -> tuple[str, ...] | None:
-        """Return the columns with accuracy and signal-to-noise ratio of the rows of a sensor.
+        """Return the columns with accuracy, signal-to-noise ratio, class and size of the rows of a sensor.
 
         None if its rows bring no noise: without such columns, and with all components of the measurement.
         """
@@ -78,6 +78,8 @@ class ScanColumns:
         if {"x_std", "y_std"} <= set(self._columns):
             names += ["xy_correlation"] * is_position(site.kind)
         names += ["snr"] * (site.signal is not None)
+        if site.features is not None:
+            names += ["class"] * bool(site.features.reports) + ["size"] * bool(site.features.sizes)
         names += [f"own_{each}_std" for each in pose_stds_of(COMPONENTS[site.kind], site.kind in HEIGHT_DEPENDENT)]
         own = tuple(name for name in names if name in self._columns)
         has_gaps = any(self._has_gaps(name) for name in COMPONENTS[site.kind] if name in GAPS)

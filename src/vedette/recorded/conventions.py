@@ -34,6 +34,8 @@ UNITS: dict[str, Mapping[str, float]] = {
     "own_vy_std": SPEEDS,
     "xy_correlation": {"": 1.0},
     "snr": {"db": 1.0},
+    "class": {"": 1.0},
+    "size": LENGTHS,
 }
 OWN_SPEEDS = ("own_vx", "own_vy")  # velocity of a sensor, east and north, read if it measures range rates
 # Third components of measurements, which single rows need not have, and what stands in for them until births.
@@ -47,6 +49,7 @@ OTHER_NAMES = {
     "time": ("time_s", "time_utc", "BaseDateTime"),
     "range": ("distance",),
     "altitude": ("height", "flight_level"),
+    "size": ("length",),
 }
 # Largest distance between places in metres and in degrees in one row: m, plus a share of the distance from the origin.
 ONE_PLACE, ONE_PLACE_SHARE = 50.0, 0.001

@@ -70,11 +70,19 @@ def _told(site: RecordedSensor, before: int, after: int, offsets: Floats) -> str
 
 
 def _mean_accuracy(accuracy: Floats, columns: Sequence[str], clusters: Ints) -> Floats:
-    """Return the columns of accuracy of each cluster: root mean squares of standard deviations, means of others."""
+    """Return the columns of accuracy of each cluster.
+
+    They are root mean squares of standard deviations, means of others, and a class if all agree.
+    """
     is_std = np.array([name.endswith("_std") for name in columns])
     powers = np.where(is_std, accuracy**2, accuracy)
     means = np.array([powers[clusters == cluster].mean(axis=0) for cluster in range(int(clusters.max(initial=-1)) + 1)])
     means = means.reshape(-1, len(columns))
+    if "class" in columns:  # an index, of no class where they differ
+        k = columns.index("class")
+        for cluster, mean in enumerate(means):
+            own = accuracy[clusters == cluster, k]
+            mean[k] = own[0] if (own == own[0]).all() else np.nan
     return np.where(is_std, np.sqrt(np.where(is_std, means, 1.0)), means)
 
 

@@ -17,6 +17,7 @@ from vedette.kernels.base.types import BEAM, Floats
 from vedette.models import Bias
 from vedette.models.arguments import float_array
 from vedette.models.bias import NO_BIAS, with_offsets
+from vedette.models.classes import ClassFeatures
 from vedette.models.row_noise import SignalModel
 from vedette.models.turns import is_turn
 from vedette.platforms.compass import Compass, PlaneCompass, course_deg, wrapped
@@ -55,6 +56,7 @@ class RecordedSensor:
         north: direction of true north; an `Origin` gives it at every place, the default is along y.
         turn: how its beam turns, if its scans are turns; "found": from its rows, if they show one; "none": no turn.
         signal: signal-to-noise ratios of its measurements; None: a column of these is not read.
+        features: reported classes and sizes of its measurements; None: columns of these are not read.
     """
 
     name: str
@@ -66,6 +68,7 @@ class RecordedSensor:
     north: Compass = field(default_factory=PlaneCompass)
     turn: Turning = "found"
     signal: SignalModel | None = None
+    features: ClassFeatures | None = None
 
     def from_raw(self, raw: ArrayLike, pose: ArrayLike | None = None) -> Floats:
         """Return (num, meas_dim) measurements for filters, bias included, from the sensor's own measurements.
@@ -113,7 +116,8 @@ class RecordedScans(SummaryRepr):
         file: of the rows.
         accuracy: for each instant one per sensor: (num, num_columns) values of columns of accuracy as they were read,
             SI units, NaN for an empty cell; None: no scan, or no such columns.
-        accuracy_columns: for each sensor, their quantities, such as "range_std" or "snr".
+        accuracy_columns: for each sensor, their quantities, such as "range_std" or "snr"; a
+            "class" is the index of its name in the sensor's `features.reports`.
         gathered: for each sensor, the median time between the first and the last row of its scans of several rows, s; 0
             for a sensor without such scans or whose scans are turns; () if the scans are not from rows.
     """

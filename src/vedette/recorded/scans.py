@@ -187,30 +187,52 @@ class _Rows(ScanColumns):
 
     def _own_accuracy(self, i: int, s: int) -> dict[str, float]:
         """Return the values of a row's columns of accuracy, NaN for empty cells."""
-        return {name: self._accuracy_value(i, name) for name in self.accuracy[s] or ()}
+        return {name: self._accuracy_value(i, s, name) for name in self.accuracy[s] or ()}
 
-    def _accuracy_value(self, i: int, name: str) -> float:
+    def _accuracy_value(self, i: int, s: int, name: str) -> float:
         if self._is_blank(i, name):
             return math.nan
+        if name == "class":
+            return self._report(i, s)
         if name == "xy_correlation":
             return self._correlation(i)
-        return self._value(i, name) if name == "snr" else self._std(i, name)
+        return self._value(i, name) if name in ("snr", "size") else self._std(i, name)
+
+    def _report(self, i: int, s: int) -> float:
+        """Return the index of the class that a row reports."""
+        features, column = self.sites[s].features, self._columns["class"][0]
+        assert features is not None  # else the column is not read
+        report = str(self.table.columns[column][i]).strip()
+        if report not in features.reports:
+            raise self.table.fault(i, column, f"one of {', '.join(map(shown, features.reports))}, or an empty cell")
+        return float(features.reports.index(report))
 
     def _row_noise(
         self, i: int, s: int, measured: Sequence[float], pose: Sequence[float], accuracy: Mapping[str, float]
     ) -> tuple[float, ...]:
-        """Return covariance and log likelihood ratio of a row in the order of `row_noise`; () for rows without them."""
+        """Return covariance and log likelihood ratios of a row in the order of `row_noise`; () for rows without any."""
         if self.accuracy[s] is None:
             return ()
-        own, signal = {name: value for name, value in accuracy.items() if not math.isnan(value)}, self.sites[s].signal
+        own, site = {name: value for name, value in accuracy.items() if not math.isnan(value)}, self.sites[s]
         names = COMPONENTS[self.sites[s].kind]
         missing = [name in GAPS and self._is_blank(i, name) for name in names]
         stds = [own.get(f"{name}_std", 0.0) for name in names]
-        ratio = signal.log_likelihood_ratio(own["snr"]) if signal is not None and "snr" in own else 0.0
+        ratio = site.signal.log_likelihood_ratio(own["snr"]) if site.signal is not None and "snr" in own else 0.0
+        classes: Sequence[float] = ()
+        if site.features is not None:
+            report = int(own["class"]) if "class" in own else None
+            classes = site.features.log_ratios(report, own.get("size")).tolist()
         of_pose = PoseStds(**{name: own.get(f"own_{name}_std", 0.0) for name in PoseStds._fields})
         added = pose_noise(measured, names, pose, of_pose) if any(of_pose) else None
         correlation = own.get("xy_correlation", 0.0)
-        return row_noise(stds, missing, correlation=correlation, log_likelihood_ratio=ratio, added=added)
+        return row_noise(
+            stds,
+            missing,
+            correlation=correlation,
+            log_likelihood_ratio=ratio,
+            added=added,
+            log_class_ratios=classes,
+        )
 
     def _is_blank(self, i: int, quantity: str) -> bool:
         return is_empty(self.table.columns[self._columns[quantity][0]][i])

@@ -38,7 +38,9 @@ _COUNTS = {"num_targets": Kind.INTEGER, "num_estimates": Kind.INTEGER}
 LAYOUTS: dict[str, Layout] = {
     "scans": Layout({**_TIME, **_COUNTS, **dict.fromkeys(OSPA_COLUMNS, Kind.NUMBER), **FUSION_COLUMNS}),
     "truth": Layout({**_TIME, "target": Kind.INTEGER}, {"state_": Kind.NUMBER}),
-    "tracks": Layout({**_TIME, **_LABEL, "existence": Kind.NUMBER}, {"mean_": Kind.NUMBER, "cov_": Kind.NUMBER}),
+    "tracks": Layout(
+        {**_TIME, **_LABEL, "existence": Kind.NUMBER}, dict.fromkeys(("mean_", "cov_", "class_"), Kind.NUMBER)
+    ),
     "sensors": Layout(
         {**_TIME, "sensor": Kind.INTEGER, **dict.fromkeys(POSE_COLUMNS, Kind.NUMBER), **SENSOR_COLUMNS},
         {"pose_": Kind.NUMBER, OFF: Kind.COUNT},
@@ -191,6 +193,7 @@ def _tracks(record: RunRecord) -> Columns:
         "existence": np.concatenate([estimate.existence for estimate in record.estimates]),
         **_columns("mean_", np.concatenate([estimate.means for estimate in record.estimates])),
         **_columns("cov_", covs.reshape(len(covs), covs.shape[1] * covs.shape[2])),
+        **_columns("class_", np.concatenate([estimate.class_probs for estimate in record.estimates])),
     }
 
 
@@ -198,8 +201,11 @@ def _estimates_of(table: Mapping[str, Any], num_scans: int) -> tuple[Estimate, .
     labels = np.stack([table["birth_step"], table["birth_site"]], axis=1)
     means, existence = _matrix(table, "mean_"), table["existence"]
     covs = _matrix(table, "cov_").reshape(len(means), means.shape[1], means.shape[1])
+    classes = np.empty((len(means), 0))
+    if "class_0" in table:  # of targets with classes
+        classes = _matrix(table, "class_")
     rows = [slice(start, stop) for start, stop in pairwise(_offsets(table, num_scans).tolist())]
-    return tuple(Estimate(labels[row], means[row], covs[row], existence[row]) for row in rows)
+    return tuple(Estimate(labels[row], means[row], covs[row], existence[row], classes[row]) for row in rows)
 
 
 def _sensors(record: RunRecord) -> Columns:

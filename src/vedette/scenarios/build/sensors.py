@@ -42,7 +42,7 @@ def build_sensors(scenario: Scenario) -> tuple[MobileSensor, ...]:
     targets = TargetModel(
         model.motion.build(folder, method=method),
         model.survival.build(folder),
-        replace(birth, anywhere=undetected_anywhere(model, birth)),
+        replace(birth, anywhere=undetected_anywhere(model, birth), class_probs=model.class_probs),
     )
     sensors = []
     for sensor in model.sensors:

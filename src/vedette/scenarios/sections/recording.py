@@ -28,9 +28,9 @@ class RecordingSection(Section):
 
     The sensors are as `sensors` says, at their positions unless a row has `own_x` and `own_y`, or `own_lon` and
     `own_lat`, and `own_heading`. Standard deviations of a row (`range_std_m`, `bearing_std_deg`, `x_std_m`, ... and
-    `xy_correlation`) replace the noise of the sensor; `snr_db` counts for a sensor with `signal`; a row may lack an
-    altitude, elevation or range rate. Of range rates `own_vx` and `own_vy` say how the sensor moves; else it is at
-    rest.
+    `xy_correlation`) replace the noise of the sensor; `snr_db` counts for a sensor with `signal`, `class` and
+    `size_m` for one with `classification`; a row may lack an altitude, elevation or range rate. Of range rates `own_vx`
+    and `own_vy` say how the sensor moves; else it is at rest.
     A row with empty cells says that a sensor scanned and found nothing.
     Rows beyond a sensor's reach, or far beyond all others, are left out and named.
     """
@@ -133,6 +133,7 @@ def recorded_sensors(world: ScenarioModel) -> list[RecordedSensor]:
             north,
             shown_by_rows if sensor.turn is None else sensor.turn.build(),
             None if sensor.signal is None else sensor.signal.build(),
+            None if sensor.classification is None else sensor.classification.build(world.classes),
         )
         for name, sensor in zip(world.sensor_names, world.sensors, strict=True)
     ]

@@ -8,11 +8,12 @@ from collections.abc import Iterator, Mapping
 from itertools import pairwise
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
+import numpy as np
 from pydantic import Field, field_validator
 
 from vedette.internal.quantities import HEIGHT_DEPENDENT
 from vedette.scenarios.diagnostics import Finding, describe
-from vedette.scenarios.sections.base import Name, Section, check, readable_findings
+from vedette.scenarios.sections.base import Chance, Name, Section, check, readable_findings
 from vedette.scenarios.sections.birth import Birth
 from vedette.scenarios.sections.checks import CHECKS, step_of_time
 from vedette.scenarios.sections.control import Control
@@ -24,7 +25,7 @@ from vedette.scenarios.sections.places import OriginSection, in_metres, misplace
 from vedette.scenarios.sections.planners import STRATEGIES, AnyPlanner
 from vedette.scenarios.sections.recording import RecordingSection
 from vedette.scenarios.sections.scoring import AnyEstimator, AnyMetric, LeastOspaEstimator, MapEstimator, Ospa
-from vedette.scenarios.sections.sensors import Sensor, SensorDefaults
+from vedette.scenarios.sections.sensors import CLUTTER, Sensor, SensorDefaults
 from vedette.scenarios.sections.targets import Targets
 from vedette.scenarios.sections.tracking import AnyFilter, Filter
 from vedette.scenarios.sections.undetected import UndetectedSection
@@ -36,6 +37,7 @@ from vedette.scenarios.sections.world import (
 )
 
 if TYPE_CHECKING:  # importing it imports the models, which a check does not need
+    from vedette.kernels.base.types import Floats
     from vedette.platforms.compass import Compass
 
 # Largest number of steps of a horizon that ends at the next decision.
@@ -86,6 +88,11 @@ class ScenarioModel(Section):
     motion: Motion = Field(default=of_kind("constant_velocity"), description="How targets move [-].")
     survival: Survival = Field(default=of_kind("constant"), description="Whether they go on living [-].")
     birth: Birth = Field(description="Where they appear, as the filters know it [-].")
+    classes: dict[Name, Chance] = Field(
+        default={},
+        description="Probability of each class of target, for sensors with `classification`; none: targets have no "
+        "classes [-].",
+    )
     targets: Targets = Field(description="The true targets [-].")
     recording: RecordingSection | None = Field(
         default=None, description="Scans that were recorded; none: they are simulated [-]."
@@ -124,6 +131,23 @@ class ScenarioModel(Section):
                 yield ("planners", name), f"another name than {', '.join(STRATEGIES)}", describe(name)
             elif name.startswith("-"):
                 yield ("planners", name), "a name that does not begin as an option does", describe(name)
+
+    @property
+    def class_probs(self) -> Floats | None:
+        """Probability of each class of target, (num_classes,); None if targets have no classes."""
+        return np.array(list(self.classes.values())) if self.classes else None
+
+    @check
+    def _classes_of_targets(self) -> Iterator[Finding]:
+        if CLUTTER in self.classes:
+            yield ("classes", CLUTTER), f"another name than {CLUTTER}, which is of false measurements", CLUTTER
+        if self.classes and (len(self.classes) < 2 or abs(sum(self.classes.values()) - 1.0) > 1e-6):
+            total = f"{len(self.classes)} of sum {sum(self.classes.values()):g}"
+            yield ("classes",), "at least 2 probabilities that sum to 1", total
+        for i, sensor in enumerate(self.sensors):
+            if sensor.classification is not None:
+                for path, wanted, got in sensor.classification.faults(self.classes):
+                    yield ("sensors", i, "classification", *path), wanted, got
 
     @check
     def _names_of_measures(self) -> Iterator[Finding]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -20,6 +20,7 @@ from vedette.scenarios.sections.base import (
     Name,
     Point,
     Positive,
+    Probability,
     Section,
     check,
 )
@@ -38,9 +39,12 @@ from vedette.scenarios.sections.sensing import (
 from vedette.scenarios.sections.true_sensors import BiasSection, TrueSensor, build_parts
 
 if TYPE_CHECKING:  # importing the models imports the compiler, which a check does not need
-    from vedette.models import Region, SensorModel, SignalModel
+    from vedette.models import ClassFeatures, Region, SensorModel, SignalModel
     from vedette.models.turns import Turn
     from vedette.simulation import TrueSensor as TrueSensorModel
+
+
+CLUTTER = "clutter"  # key of false measurements among those of the classes
 
 
 class TurnSection(Section):
@@ -89,6 +93,63 @@ class SignalSection(Section):
         from vedette.models import SignalModel
 
         return SignalModel(self.mean_db, self.threshold_db, self.clutter_db)
+
+
+class SizeSection(Section):
+    """Measured sizes, such as the lengths of ships: a Gaussian."""
+
+    mean: Positive = Field(description="Mean [m].")
+    std: Positive = Field(description="Standard deviation, between targets and by the measurement [m].")
+
+
+class ClassificationSection(Section):
+    """Evidence of a sensor's measurements about the class of a target.
+
+    The keys are the names in `classes`, and optionally `clutter` for false measurements; without it, they report what
+    targets do.
+    """
+
+    confusion: dict[Name, dict[Name, Probability]] = Field(
+        default={},
+        description="For each class the probability of each value of the column `class`; none: it is not read [-].",
+    )
+    size: dict[Name, SizeSection] = Field(
+        default={}, description="For each class the values of the column `size_m`; none: it is not read [-]."
+    )
+
+    def faults(self, classes: Mapping[str, float]) -> Iterator[Finding]:
+        """Yield the faults of its tables for targets of these classes."""
+        if not self.confusion and not self.size:
+            yield ("confusion",), "probabilities of reported classes, or `size`", "neither"
+        for name, table in (("confusion", self.confusion), ("size", self.size)):
+            if table and set(table) - {CLUTTER} != set(classes):
+                wanted = f"the classes {', '.join(classes)}" if classes else "`classes` of targets in the file"
+                yield (name,), f"{wanted}, and optionally {CLUTTER}", ", ".join(table)
+        for name, probs in self.confusion.items():
+            reports = set().union(*self.confusion.values())
+            if missing := sorted(reports - set(probs)):
+                wanted = f"the same reports for each class: also {', '.join(missing)}"
+                yield ("confusion", name), wanted, ", ".join(probs)
+            elif abs(sum(probs.values()) - 1.0) > 1e-6:
+                yield ("confusion", name), "probabilities that sum to 1", describe(sum(probs.values()))
+
+    def build(self, classes: Mapping[str, float]) -> ClassFeatures | None:
+        """Return the features of the sensor; None if the tables have faults. classes: probability of each."""
+        from vedette.models import ClassFeatures
+
+        if any(True for _ in self.faults(classes)):
+            return None
+        reports = tuple(next(iter(self.confusion.values()), {}))
+        rows = {name: tuple(probs[report] for report in reports) for name, probs in self.confusion.items()}
+        sizes = {name: (each.mean, each.std) for name, each in self.size.items()}
+        return ClassFeatures(
+            tuple(classes.values()),
+            reports,
+            tuple(rows[name] for name in classes if rows),
+            rows.get(CLUTTER, ()),
+            tuple(sizes[name] for name in classes if sizes),
+            sizes.get(CLUTTER, ()),
+        )
 
 
 class Sensor(Section):
@@ -143,6 +204,11 @@ class Sensor(Section):
     signal: SignalSection | None = Field(
         default=None,
         description="What the column `snr_db` of a recording says of a row; none: the column is not read [-].",
+    )
+    classification: ClassificationSection | None = Field(
+        default=None,
+        description="Probabilities of the columns `class` and `size_m` of a recording for each class of target; none: "
+        "they are not read [-].",
     )
     detection: Detection = Field(default=of_kind("gaussian"), description="Probability of detection [-].")
     clutter: Clutter = Field(default=of_kind("region"), description="False measurements [-].")
