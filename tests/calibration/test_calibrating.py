@@ -48,18 +48,23 @@ def at_truth(problem: Problem) -> Floats:
 
 
 def test_the_likelihood_is_the_sum_of_what_the_filter_reports(tmp_path: Path) -> None:
-    """Of clutter around the sensor, which ends nowhere that matters, number for number."""
+    """Of clutter around the sensor, which ends nowhere that matters, number for number.
+
+    With sigma points and wide gates, as switches of the method and edges of gates would make it jump.
+    """
     clutter = "  clutter: {kind: around_sensor, rate: 2.0, radius: 40000.0}\nsensors:"
-    scenario, scans, _ = recorded(tmp_path, text=(SENSORS + MOTION).replace("sensors:\n", clutter + "\n", 1))
+    text = (SENSORS + MOTION + "filter: {kind: lmb, gaussian_method: ukf}\n").replace("sensors:\n", clutter + "\n", 1)
+    scenario, scans, _ = recorded(tmp_path, text=text)
     filters = [sensor.filter for sensor in build_sensors(scenario)]
     sensors = tuple(each.sensor for each in filters)
-    tracker = Central(SequentialLmbFilter(common_target_model(filters), sensors, Limits(min_existence=1e-3)))
+    limits = Limits(min_existence=1e-3, gate_probability=1.0 - 1e-12, merge_distance=0.5, max_components=20)
+    tracker = Central(SequentialLmbFilter(common_target_model(filters), sensors, limits))
     state, total, rngs = tracker.initial(), [], (np.random.default_rng(0),) * 2
     for time, measured, poses in zip(scans.times.tolist(), scans.scans, scans.poses, strict=True):
         state, info = tracker.step(state, list(measured), poses, time, rngs=rngs)
         total.append(info.filters[0].log_likelihood)
         state, _ = tracker.step(state, [None, None], poses, time + 1e-9, rngs=rngs)  # who is born is there at once
-    problem = build_problem(scenario)
+    problem = build_problem(recorded(tmp_path, text=text.replace("ukf", "auto")).scenario)
     found = problem.log_likelihoods(at_start(problem))
     assert found.sum() == pytest.approx(sum(total), rel=1e-9)
     assert sorted(found[found != 0.0].tolist()) == pytest.approx(sorted(total), rel=1e-6)
@@ -68,7 +73,7 @@ def test_the_likelihood_is_the_sum_of_what_the_filter_reports(tmp_path: Path) ->
 def test_clutter_of_the_region_weighs_as_much_wherever_a_bias_takes_it(tmp_path: Path) -> None:
     """A single radar that is turned sees all the same: by 20 degrees, where corners of the region are left.
 
-    But for the sigma points of measurements that bend, which follow the axes of the plane.
+    But for the sigma points, which follow the axes of the plane: 0.1 of 60 s.
     """
     text = SENSORS.replace("  - {name: boat, position: [0.0, 0.0]}\n", "") + MOTION
     write_recording(tmp_path, seconds=60.0)
@@ -79,7 +84,7 @@ def test_clutter_of_the_region_weighs_as_much_wherever_a_bias_takes_it(tmp_path:
     before, turned = at_start(problem), at_start(problem)
     turned[[each.component for each in problem.parameters].index("bearing")] = 20.0
     total = problem.log_likelihoods(before).sum()
-    assert problem.log_likelihoods(turned).sum() == pytest.approx(total, abs=1e-3)
+    assert problem.log_likelihoods(turned).sum() == pytest.approx(total, abs=0.2)
     calibration = calibrate(problem)
     found = {each.parameter.name: each for each in calibration.estimates}
     assert "no other sensor" in found["bearing_deg"].reason

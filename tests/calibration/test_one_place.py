@@ -121,7 +121,7 @@ def test_sensors_on_one_straight_course_are_at_one_place(courses: Sequence[Cours
     table = np.array(rows)
     num, none = len(table), np.zeros(len(courses), np.int64)
     sensors, zeros = table[:, 1].astype(np.int64), np.zeros((num, 2))
-    states = np.column_stack([np.full(num, 500.0), np.full(num, 3000.0), zeros])
+    states = np.column_stack([np.full(num, 500.0), np.full(num, 3000.0), zeros, zeros])
     pairs = MatchedMeasurements(
         table[:, 0], sensors, np.zeros(num, np.int64), zeros, table[:, 2:], states, none, none, none
     )

@@ -14,7 +14,9 @@ from vedette.calibration.maximum_likelihood import Maximum, Terms, conditional_m
 from vedette.calibration.parameters import Parameter, Problem
 from vedette.calibration.registration import (
     BIASES,
+    MOST_FITTED,
     MatchedMeasurements,
+    fitted,
     groups_with_common_targets,
     is_one_place,
     match_measurements,
@@ -26,9 +28,11 @@ from vedette.kernels.base.types import Floats
 _NEARER = 3.0  # multiple of the estimated noise, in the next round
 _QUANTILE = 1.959964  # of the normal distribution, 97.5 %
 _COMPARED = ("clock", "x", "y")  # components that are relative to those of the first sensor
-_BY_MOTION = {  # bias that needs a second sensor at another place: effect that looks the same without one
-    "bearing": "a rotation of all targets",
-    "range": "another motion of the targets than assumed",
+_OTHER_MOTION = "another motion of the targets than assumed"
+_BY_MOTION = {  # biases that need a second sensor at another place: effect that looks the same without one
+    ("bearing",): "a rotation of all targets",
+    ("range",): _OTHER_MOTION,
+    ("elevation", "altitude"): _OTHER_MOTION,
 }
 _NO_SHARED = "no other sensor observes enough of the same targets"
 _SHORT = 1.0  # log likelihood by which a search with fixed parameters may exceed the full search
@@ -93,15 +97,12 @@ def calibrate(
         return problem.log_likelihoods(whole)
 
     before = float(terms(said[asked], asked).sum())
-    guessed, pairs = _guess(problem, said, asked, progress)
-    groups = groups_with_common_targets(pairs, len(problem.sites))
+    guessed, groups, by_motion = _guess(problem, said, asked, progress)
     apart = [s for group in groups if group != groups[0] or len(group) == 1 for s in group]
-    held = {i: _unknown(problem, i) for i in _biases_by_motion(problem, pairs, groups) if i in asked}
+    held = {i: _unknown(problem, i, why) for i, why in by_motion.items()}
     free = [i for i in asked if i not in held]
     if not free:
         return Calibration(tuple(held[i] for i in asked), before, before, True, 0)
-    if held:
-        guessed, pairs = _guess(problem, said, free, progress)
     start = guessed if float(terms(guessed[free], free).sum()) > before else said.copy()
     found, directions, own = held, list[int](), free
     highest, again = math.inf, False
@@ -129,33 +130,31 @@ def calibrate(
     return Calibration(kept, log_likelihood, before, maximum.converged, directions[0])
 
 
-def _biases_by_motion(problem: Problem, pairs: MatchedMeasurements, groups: Sequence[Sequence[int]]) -> list[int]:
-    """Return the biases of bearings and ranges that would follow from the assumed motion of the targets alone.
+def _biases_by_motion(problem: Problem, pairs: MatchedMeasurements, groups: Sequence[Sequence[int]]) -> dict[int, str]:
+    """Return the biases that would follow from the assumed motion of the targets alone, and what looks the same.
 
     They are those of a sensor that shares no targets with a sensor at another place. Of several sensors at one place
     they are those of the first, which the others are compared with. A sensor that measures positions suffices anywhere.
 
     groups: of sensors that share targets.
     """
-    kinds, found = [COMPONENTS[site.kind] for site in problem.sites], list[int]()
+    kinds, found = [COMPONENTS[site.kind] for site in problem.sites], dict[int, str]()
     for group in groups:
         if any("x" in kinds[s] for s in group) or not is_one_place(pairs, group):
             continue
-        for name in _BY_MOTION:
-            first = next((s for s in group if name in kinds[s]), None)
-            found += [
-                i
-                for i, each in enumerate(problem.parameters)
-                if (each.sensor, each.kind, each.component) == (first, "bias", name)
-            ]
+        for names, effect in _BY_MOTION.items():
+            first = next((s for s in group if {*names} & {*kinds[s]}), None)
+            for i, each in enumerate(problem.parameters):
+                if each.sensor == first and each.kind == "bias" and each.component in names:
+                    found[i] = effect
     return found
 
 
-def _unknown(problem: Problem, i: int) -> ParameterEstimate:
-    """Return a bias that would follow from the assumed motion alone, as not identifiable."""
+def _unknown(problem: Problem, i: int, effect: str) -> ParameterEstimate:
+    """Return a bias that would follow from the assumed motion alone, as not identifiable. effect: looks the same."""
     own, alone = problem.parameters[i], len(problem.sites) == 1
     lacking = "there is no other sensor" if alone else f"{_NO_SHARED} from another place"
-    reason = f"not identifiable: {lacking} to separate it from {_BY_MOTION[own.component]}"
+    reason = f"not identifiable: {lacking} to separate it from {effect}"
     return ParameterEstimate(own, own.start, math.nan, math.nan, reason)
 
 
@@ -182,34 +181,50 @@ def _blocks(parameters: tuple[Parameter, ...]) -> list[list[int]]:
     return blocks
 
 
-def _guess(
-    problem: Problem, said: Floats, own: Sequence[int], progress: Callable[[], None]
-) -> tuple[Floats, MatchedMeasurements]:
-    """Return an initial guess, for the biases among `own`, and the matched measurements that it is based on.
+class _Guess(NamedTuple):
+    """Initial guess.
+
+    free: values of all parameters on their scales. groups: of sensors that share targets. by_motion: biases that would
+    follow from the assumed motion alone, which stay at their start values; and what looks the same.
+    """
+
+    free: Floats
+    groups: list[list[int]]
+    by_motion: dict[int, str]
+
+
+def _guess(problem: Problem, said: Floats, asked: Sequence[int], progress: Callable[[], None]) -> _Guess:
+    """Return an initial guess of the parameters, and of the biases among `asked`.
 
     The recording is tracked with noise as wide as the biases may be, then with narrower noise; biases are fitted each
-    time.
+    time, except those that the measurements matched this time leave to the assumed motion.
     """
     values, sites = problem.values(said), problem.sites
-    far = np.array([[QUANTITIES[name].far for name in 2 * COMPONENTS[site.kind]][:2] for site in sites])
-    asked, unknown = np.zeros((len(sites), len(BIASES)), bool), np.ones((len(sites), len(BIASES)))
+    names = [(MOST_FITTED * COMPONENTS[site.kind])[:MOST_FITTED] for site in sites]
+    stds = np.array([[QUANTITIES[name].far for name in own] for own in names])
     # The initial guess leaves out range rates: their noise is as wide as their bias may be.
-    places, wide = {}, QUANTITIES["range_rate"].far
-    for i, each in enumerate(problem.parameters):
-        if each.kind == "bias" and i in own and each.component in BIASES:
-            at = each.sensor, BIASES.index(each.component)
-            places[i], asked[at], unknown[at] = at, True, each.unknown / abs(each.per_si)
-    stds = far
+    places, wide, unknown = {}, QUANTITIES["range_rate"].far, np.ones((len(sites), len(BIASES)))
+    for i in asked:
+        each = problem.parameters[i]
+        if each.kind == "bias" and each.component in BIASES:
+            places[i] = at = each.sensor, BIASES.index(each.component)
+            unknown[at] = each.unknown / abs(each.per_si)
     for _ in range(3):
         recording = problem.without_biases(values)
         progress()
         pairs = match_measurements(problem.tracker(_with_noise(problem, values, stds, wide))[0], recording, sites, stds)
-        found = register(pairs, sites, asked, unknown, stds, _period(problem))
+        groups = groups_with_common_targets(pairs, len(sites))
+        by_motion = {i: why for i, why in _biases_by_motion(problem, pairs, groups).items() if i in asked}
+        fitting = np.zeros(unknown.shape, bool)
         for i, at in places.items():
-            values[i] += problem.parameters[i].per_si * found.biases[at]
+            fitting[at] = i not in by_motion
+        found = register(pairs, sites, fitting, unknown, stds, _period(problem))
+        for i, at in places.items():
+            each = problem.parameters[i]
+            values[i] = each.start if i in by_motion else values[i] + each.per_si * found.biases[at]
         stds = np.minimum(stds, _NEARER * found.stds)
     values = _with_noise(problem, values, found.stds, None)
-    return problem.free(_with_counts(problem, values, pairs).tolist()), pairs
+    return _Guess(problem.free(_with_counts(problem, values, pairs).tolist()), groups, by_motion)
 
 
 def _period(problem: Problem) -> float:
@@ -220,15 +235,15 @@ def _period(problem: Problem) -> float:
 
 
 def _with_noise(problem: Problem, values: Floats, stds: Floats, rates: float | None) -> Floats:
-    """Return the values with noise of these standard deviations, (num_sensors, 2).
+    """Return the values with noise of these standard deviations, (num_sensors, MOST_FITTED).
 
     rates: the same for range rates, m/s; None: as assumed.
     """
     values = values.copy()
     for i, each in enumerate(problem.parameters):
         if each.kind == "noise":
-            place = COMPONENTS[problem.sites[each.sensor].kind].index(each.component)
-            own = stds[each.sensor, place] if place < 2 else rates
+            names = fitted(problem.sites[each.sensor].kind)
+            own = stds[each.sensor, names.index(each.component)] if each.component in names else rates
             values[i] = each.start if own is None else abs(each.per_si) * own
     return values
 

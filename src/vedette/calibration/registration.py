@@ -14,14 +14,17 @@ import numpy as np
 from scipy.optimize import linear_sum_assignment
 
 from vedette.densities import as_lmb, track_moments
-from vedette.internal.quantities import COMPONENTS
-from vedette.kernels.base.types import Bools, Floats, Ints
-from vedette.models.row_noise import measured_part
+from vedette.internal.quantities import COMPONENTS, HEIGHT_DEPENDENT, is_position
+from vedette.kernels.base.types import HEIGHT, OWN_HEIGHT, Bools, Floats, Ints
+from vedette.kernels.gaussian.row_noise import MISSING
+from vedette.models.row_noise import measured_part, noise_of_rows
 from vedette.recorded import RecordedScans, RecordedSensor
 from vedette.recorded.scan_times import with_wrapped_angles
 from vedette.tracking import Tracker
 
-BIASES = ("range", "bearing", "clock", "x", "y")  # per sensor, in this order, SI units, bearings counter-clockwise
+# Biases of a sensor, in this order, in SI units, bearings counter-clockwise. Range rates are left to the likelihood.
+BIASES = ("range", "bearing", "clock", "x", "y", "elevation", "altitude")
+MOST_FITTED = 3  # largest number of components of a measurement that are fitted
 _SURE = 0.5  # existence probability above which a track is matched with measurements
 _GATE = 4.0  # standard deviations
 _HUBER = 1.5
@@ -30,6 +33,7 @@ _SCANS_A_PIECE = 5  # scans of the slowest sensor per piece
 _LEAST_PAIRS = 4  # least number of pairs in a piece
 _LEAST_SEEN = 3  # least number of measurements of a target for a sensor to share it with others
 _MAD = 1.4826  # standard deviation of Gaussian numbers over their median absolute value
+_PLACE, _VELOCITY = [0, 1, 4], [2, 3, 5]  # components of a state
 _BASELINE = 0.03  # distance between sensors, as a share of that of the targets, below which they are at one place
 _POSITION, _SPEED = 1e4, 30.0  # m, m/s: prior that regularises poorly determined pieces
 
@@ -37,10 +41,10 @@ _POSITION, _SPEED = 1e4, 30.0  # m, m/s: prior that regularises poorly determine
 class MatchedMeasurements(NamedTuple):
     """Measurements matched with tracks.
 
-    times: (n,) s. sensors, tracks: (n,) numbers. measured: (n, 2) first two components, NaN if there is only one; range
-    rates are left to the likelihood. poses: (n, 2) positions of the sensors. states: (n, 4) predicted states of the
-    tracks. missed, false, scans: (num_sensors,) numbers of tracks without a measurement, of measurements without a
-    track, and of scans.
+    times: (n,) s. sensors, tracks: (n,) numbers. measured: (n, MOST_FITTED) the `fitted` components, then NaN; NaN also
+    where a row lacks one. poses: (n, 3) positions and heights of the sensors. states: (n, 6) predicted states of the
+    tracks, [px, py, vx, vy, pz, vz], with zeros where no height is estimated. missed, false, scans: (num_sensors,)
+    numbers of tracks without a measurement, of measurements without a track, and of scans.
     """
 
     times: Floats
@@ -54,6 +58,11 @@ class MatchedMeasurements(NamedTuple):
     scans: Ints
 
 
+def fitted(kind: str) -> tuple[str, ...]:
+    """Return the components of a kind of measurement that are fitted, the first ones: all but range rates."""
+    return tuple(name for name in COMPONENTS[kind] if name in BIASES)
+
+
 def match_measurements(
     tracker: Tracker, recording: RecordedScans, sites: Sequence[RecordedSensor], stds: Floats
 ) -> MatchedMeasurements:
@@ -63,66 +72,96 @@ def match_measurements(
         tracker: tracker for the sensors; draws no random numbers.
         recording: recording without the known biases.
         sites: the sensors.
-        stds: (num_sensors, 2) standard deviations for gating measurements around tracks.
+        stds: (num_sensors, MOST_FITTED) standard deviations for gating measurements around tracks.
     """
+    has_heights = any(site.kind in HEIGHT_DEPENDENT for site in sites)
     rngs = (np.random.default_rng(0),) * len(sites)
     state, rows, numbers = tracker.initial(), list[tuple[float | int, ...]](), dict[tuple[int, ...], int]()
     counts = np.zeros((3, len(sites)), np.int64)
     for time, scans, poses in zip(recording.times.tolist(), recording.scans, recording.poses, strict=True):
         lmb = as_lmb(state.fused)
         sure = lmb.existence > _SURE
-        means = track_moments(lmb.tracks)[0][sure, :4]
+        moments, means = track_moments(lmb.tracks)[0][sure], np.zeros((int(sure.sum()), 6))
+        means[:, :4] = moments[:, :4]
+        if has_heights:
+            means[:, 4:] = moments[:, HEIGHT : HEIGHT + 2]
         if state.time is not None:
-            means[:, :2] += (time - state.time) * means[:, 2:]
+            means = _moved(means, np.full(len(means), time - state.time))
         labels = [numbers.setdefault(tuple(label), len(numbers)) for label in lmb.tracks.labels[sure].tolist()]
         for s, scan in enumerate(scans):
             if scan is None:
                 continue
-            pairs = _assigned(scan, means[:, :2] - poses[s, :2], poses[s, :2], sites[s].kind, stds[s])
+            place = np.append(poses[s, :2], poses[s, OWN_HEIGHT] if poses.shape[1] > OWN_HEIGHT else 0.0)
+            own = _fitted_part(scan, sites[s].kind)
+            pairs = _assigned(own, means[:, _PLACE] - place, place, sites[s].kind, stds[s])
             counts[:, s] += len(means) - len(pairs), len(scan) - len(pairs), 1
-            own = measured_part(scan, len(COMPONENTS[sites[s].kind])).tolist()
             for i, j in pairs:
-                measured = (*own[i], math.nan)[:2]
-                rows.append((time, s, labels[j], *measured, *poses[s, :2].tolist(), *means[j].tolist()))
+                measured = (*own[i].tolist(), *(math.nan,) * MOST_FITTED)[:MOST_FITTED]
+                rows.append((time, s, labels[j], *measured, *place.tolist(), *means[j].tolist()))
         state = tracker.step(state, list(scans), poses, time, rngs=rngs)[0]
-    table = np.array(rows, np.float64).reshape(len(rows), 11)
+    table = np.array(rows, np.float64).reshape(len(rows), 15)
     whole = table[:, 1:3].astype(np.int64)
     return MatchedMeasurements(
-        table[:, 0], whole[:, 0], whole[:, 1], table[:, 3:5], table[:, 5:7], table[:, 7:], *counts
+        table[:, 0], whole[:, 0], whole[:, 1], table[:, 3:6], table[:, 6:9], table[:, 9:], *counts
     )
 
 
-def _assigned(scan: Floats, offsets: Floats, place: Floats, kind: str, stds: Floats) -> list[tuple[int, int]]:
+def _fitted_part(scan: Floats, kind: str) -> Floats:
+    """(num, num_fitted) components of measurements that are fitted, NaN where a row lacks one."""
+    dim = len(COMPONENTS[kind])
+    variances = np.diagonal(noise_of_rows(scan, np.zeros((len(scan), dim, dim))), axis1=1, axis2=2)
+    return np.where(variances < MISSING, measured_part(scan, dim), math.nan)[:, : len(fitted(kind))]
+
+
+def _moved(states: Floats, seconds: Floats) -> Floats:
+    """(n, 6) states after (n,) s at constant velocity."""
+    moved = states.copy()
+    moved[:, _PLACE] += seconds[:, None] * states[:, _VELOCITY]
+    return moved
+
+
+def _assigned(measured: Floats, offsets: Floats, place: Floats, kind: str, stds: Floats) -> list[tuple[int, int]]:
     """Return pairs of measurement and track, each at most once and within the gate."""
-    if not len(scan) or not len(offsets):
+    if not len(measured) or not len(offsets):
         return []
     predicted = _measured_of(offsets, place, kind)
-    num = predicted.shape[1]
-    gaps = with_wrapped_angles(scan[:, None, :num] - predicted[None], kind) / stds[:num]
+    gaps = _residuals(measured[:, None] - predicted[None], kind) / stds[: predicted.shape[1]]
     costs = np.minimum((gaps**2).sum(axis=2), _GATE**2)
     found = linear_sum_assignment(costs)
     return [(i, j) for i, j in zip(*(each.tolist() for each in found), strict=True) if costs[i, j] < _GATE**2]
 
 
+def _residuals(gaps: Floats, kind: str) -> Floats:
+    """Return differences of the fitted components of measurements, with angles in [-pi, pi), and 0 where one lacks."""
+    return np.nan_to_num(with_wrapped_angles(gaps, kind))
+
+
 def _measured_of(offsets: Floats, places: Floats, kind: str) -> Floats:
-    """(n, at most 2) first components of the measurements of targets at offsets from sensors at places."""
+    """(n, num_fitted) measurements of targets at offsets (n, 3) from sensors at places."""
+    x, y, z = offsets.T
+    up = z if kind in HEIGHT_DEPENDENT else 0.0
     values = {
-        "bearing": np.arctan2(offsets[:, 1], offsets[:, 0]),
-        "range": np.hypot(offsets[:, 0], offsets[:, 1]),
+        "bearing": np.arctan2(y, x),
+        "range": np.sqrt(x * x + y * y + up * up),
+        "elevation": np.arctan2(z, np.hypot(x, y)),
         "x": (offsets + places)[:, 0],
         "y": (offsets + places)[:, 1],
+        "altitude": (offsets + places)[:, 2],
     }
-    return np.stack([values[component] for component in COMPONENTS[kind][:2]], axis=1)
+    return np.stack([values[component] for component in fitted(kind)], axis=1)
 
 
 def _slopes(offsets: Floats, kind: str) -> Floats:
-    """(n, components, 2) derivatives of `_measured_of`."""
-    x, y = offsets.T
-    square = np.maximum(x * x + y * y, 1.0)
-    distance, one, none = np.sqrt(square), np.ones(len(x)), np.zeros(len(x))
-    values = {"bearing": (-y / square, x / square), "range": (x / distance, y / distance)}
-    values |= {"x": (one, none), "y": (none, one)}
-    return np.stack([np.stack(values[component], axis=1) for component in COMPONENTS[kind][:2]], axis=1)
+    """(n, num_fitted, 3) derivatives of `_measured_of`."""
+    x, y, z = offsets.T
+    up = z if kind in HEIGHT_DEPENDENT else 0.0 * z
+    square, one, none = np.maximum(x * x + y * y, 1.0), np.ones(len(x)), np.zeros(len(x))
+    ground, distance = np.sqrt(square), np.sqrt(square + up * up)
+    lift = ground * (square + z * z)
+    values = {"bearing": (-y / square, x / square, none), "range": (x / distance, y / distance, up / distance)}
+    values |= {"elevation": (-z * x / lift, -z * y / lift, square / lift)}
+    values |= {"x": (one, none, none), "y": (none, one, none), "altitude": (none, none, one)}
+    return np.stack([np.stack(values[component], axis=1) for component in fitted(kind)], axis=1)
 
 
 def groups_with_common_targets(pairs: MatchedMeasurements, num_sensors: int) -> list[list[int]]:
@@ -149,7 +188,7 @@ def is_one_place(pairs: MatchedMeasurements, sensors: Sequence[int]) -> bool:
     own = np.isin(pairs.sensors, sensors)
     if not own.any():
         return True
-    times, places = pairs.times[own], pairs.poses[own]
+    times, places = pairs.times[own], pairs.poses[own, :2]
     course = np.column_stack([np.ones(len(times)), times - times.mean()])
     away = places - course @ np.linalg.lstsq(course, places)[0]
     distances = np.hypot(*(pairs.states[own, :2] - places).T)
@@ -157,7 +196,7 @@ def is_one_place(pairs: MatchedMeasurements, sensors: Sequence[int]) -> bool:
 
 
 class Registration(NamedTuple):
-    """Biases (num_sensors, 5), ordered as `BIASES`, and (num_sensors, 2) standard deviations of the residuals."""
+    """Biases (num_sensors, num_biases), ordered as `BIASES`; (num_sensors, MOST_FITTED) stds of the residuals."""
 
     biases: Floats
     stds: Floats
@@ -176,9 +215,9 @@ def register(
     Args:
         pairs: the matched measurements.
         sites: the sensors.
-        asked: (num_sensors, 5) which biases to estimate, ordered as `BIASES`; the others are 0.
-        unknown: (num_sensors, 5) prior scales of the biases; undetermined ones stay near 0.
-        stds: (num_sensors, 2) initial standard deviations of the measurements.
+        asked: (num_sensors, num_biases) which biases to estimate, ordered as `BIASES`; the others are 0.
+        unknown: (num_sensors, num_biases) prior scales of the biases; undetermined ones stay near 0.
+        stds: (num_sensors, MOST_FITTED) initial standard deviations of the measurements.
         period: of the slowest sensor, s.
     """
     biases = np.zeros(asked.shape)
@@ -196,8 +235,8 @@ def register(
 class _Rows(NamedTuple):
     """Linearised equations.
 
-    residuals: (n, 2). own, of_bias: derivatives of the predictions by the states of the pieces and by the biases. stds:
-    (n, 2) standard deviations. sensors, pieces: (n,) numbers.
+    residuals: (n, MOST_FITTED). own, of_bias: derivatives of the predictions by the states of the pieces and by the
+    biases. stds: (n, MOST_FITTED) standard deviations. sensors, pieces: (n,) numbers.
     """
 
     residuals: Floats
@@ -216,13 +255,11 @@ def _pieces(pairs: MatchedMeasurements, length: float) -> tuple[Ints, Floats, Fl
     _, pieces, counts = np.unique(keys, axis=0, return_inverse=True, return_counts=True)
     numbers = np.where(counts >= _LEAST_PAIRS, np.cumsum(counts >= _LEAST_PAIRS) - 1, -1)
     pieces = numbers[pieces.ravel()]
-    middles, states = np.zeros(numbers.max(initial=-1) + 1), np.zeros((numbers.max(initial=-1) + 1, 4))
+    middles, states = np.zeros(numbers.max(initial=-1) + 1), np.zeros((numbers.max(initial=-1) + 1, 6))
     for w in range(len(middles)):
         own = pieces == w
         middles[w] = pairs.times[own].mean()
-        moved = pairs.states[own]
-        moved[:, :2] += (middles[w] - pairs.times[own])[:, None] * moved[:, 2:]
-        states[w] = moved.mean(axis=0)
+        states[w] = _moved(pairs.states[own], middles[w] - pairs.times[own]).mean(axis=0)
     return pieces, middles, states
 
 
@@ -234,35 +271,39 @@ def _linearised(
     middles: Floats,
     states: Floats,
 ) -> tuple[Floats, Floats, Floats]:
-    """Return (n, 2) residuals, and (n, 2, 4) and (n, 2, 5) derivatives of the predictions by piece states and
-    biases.
+    """Return (n, MOST_FITTED) residuals, and their predictions' derivatives by piece states and biases.
+
+    Components that are not fitted, or lack in a row, have zeros.
     """
-    num = len(pairs.times)
-    residuals, own, of_bias = np.zeros((num, 2)), np.zeros((num, 2, 4)), np.zeros((num, 2, 5))
+    shape = len(pairs.times), MOST_FITTED
+    residuals, own, of_bias = np.zeros(shape), np.zeros((*shape, 6)), np.zeros((*shape, len(BIASES)))
     for s, site in enumerate(sites):
         rows = np.flatnonzero((pairs.sensors == s) & (pieces >= 0))
         if not len(rows):
             continue
-        names, bias = COMPONENTS[site.kind][:2], dict(zip(BIASES, biases[s].tolist(), strict=True))
+        names, bias = fitted(site.kind), dict(zip(BIASES, biases[s].tolist(), strict=True))
         piece = states[pieces[rows]]
-        after = (pairs.times[rows] - bias["clock"] - middles[pieces[rows]])[:, None]
-        moves = 0.0 if site.kind == "position" else biases[s, 3:]
-        offsets = piece[:, :2] + after * piece[:, 2:] - (pairs.poses[rows] - moves)
+        after = pairs.times[rows] - bias["clock"] - middles[pieces[rows]]
+        places = pairs.poses[rows] - (np.zeros(3) if is_position(site.kind) else [bias["x"], bias["y"], 0.0])
+        offsets = _moved(piece, after)[:, _PLACE] - places
         slopes, dim = _slopes(offsets, site.kind), len(names)
-        predicted = _measured_of(offsets, pairs.poses[rows] - moves, site.kind)
-        predicted += [bias[name] for name in names]
-        residuals[rows, :dim] = with_wrapped_angles(pairs.measured[rows, :dim] - predicted, site.kind)
-        own[rows, :dim] = np.concatenate([slopes, after[..., None] * slopes], axis=2)
-        of_bias[rows, :dim, 2] = -(slopes @ piece[:, 2:, None])[..., 0]
-        if site.kind != "position":
-            of_bias[rows, :dim, 3:] = slopes
+        predicted = _measured_of(offsets, places, site.kind) + [bias[name] for name in names]
+        measured = pairs.measured[rows, :dim]
+        residuals[rows, :dim] = _residuals(measured - predicted, site.kind)
+        of_state, by_bias = np.zeros((len(rows), dim, 6)), np.zeros((len(rows), dim, len(BIASES)))
+        of_state[..., _PLACE], of_state[..., _VELOCITY] = slopes, after[:, None, None] * slopes
+        by_bias[..., BIASES.index("clock")] = -(slopes @ piece[:, _VELOCITY, None])[..., 0]
+        if not is_position(site.kind):
+            by_bias[..., BIASES.index("x") : BIASES.index("y") + 1] = slopes[..., :2]
         for i, name in enumerate(names):
-            of_bias[rows, i, BIASES.index(name)] = 1.0
+            by_bias[:, i, BIASES.index(name)] = 1.0
+        there = ~np.isnan(measured)[..., None]
+        own[rows, :dim], of_bias[rows, :dim] = of_state * there, by_bias * there
     return residuals, own, of_bias
 
 
 def _spreads(residuals: Floats, sensors: Ints, pieces: Ints, stds: Floats) -> Floats:
-    """(num_sensors, 2) robust standard deviations of residuals, at most `stds`; equal to it for too few residuals."""
+    """(num_sensors, MOST_FITTED) robust standard deviations of residuals, at most `stds`; `stds` if there are few."""
     found = stds.copy()
     for s in range(len(stds)):
         own = residuals[(sensors == s) & (pieces >= 0)]
@@ -276,14 +317,14 @@ def _solved(rows: _Rows, biases: Floats, unknown: Floats, num_pieces: int) -> tu
     num, size = biases.shape
     hold = unknown.ravel() ** -2.0
     left, right = np.diag(hold), -hold * biases.ravel()
-    prior, parts = np.diag([_POSITION**-2.0] * 2 + [_SPEED**-2.0] * 2), []
+    prior, parts = np.diag([_POSITION**-2.0] * 2 + [_SPEED**-2.0] * 2 + [_POSITION**-2.0, _SPEED**-2.0]), []
     sizes = np.abs(rows.residuals) / rows.stds
     weights = np.minimum(1.0, _HUBER / np.maximum(sizes, _HUBER)) / rows.stds**2
     for w in range(num_pieces):
         of = np.flatnonzero(rows.pieces == w)
-        all_biases = np.zeros((len(of), 2, num, size))
+        all_biases = np.zeros((len(of), MOST_FITTED, num, size))
         all_biases[np.arange(len(of)), :, rows.sensors[of]] = rows.of_bias[of]
-        biased, own = all_biases.reshape(-1, num * size), rows.own[of].reshape(-1, 4)
+        biased, own = all_biases.reshape(-1, num * size), rows.own[of].reshape(-1, 6)
         weight, residual = weights[of].reshape(-1, 1), rows.residuals[of].reshape(-1)
         inner, cross = own.T @ (weight * own) + prior, own.T @ (weight * biased)
         slope = (weight * own).T @ residual
@@ -293,4 +334,4 @@ def _solved(rows: _Rows, biases: Floats, unknown: Floats, num_pieces: int) -> tu
         parts.append(gain)
     change = np.asarray(np.linalg.solve(left, right), np.float64)
     changes = np.array([gain[:, -1] - gain[:, :-1] @ change for gain in parts], np.float64)
-    return change.reshape(num, size), changes.reshape(num_pieces, 4)
+    return change.reshape(num, size), changes.reshape(num_pieces, 6)

@@ -11,25 +11,26 @@ import numpy as np
 from vedette.calibration import Calibration, Parameter, Problem
 from vedette.calibration.parameters import with_biases
 from vedette.filters import Limits, SequentialLmbFilter, common_target_model
-from vedette.internal.quantities import COMPONENTS, HEIGHT_DEPENDENT, QUANTITIES, in_file
+from vedette.internal.quantities import COMPONENTS, HEIGHT_DEPENDENT, PLACED, QUANTITIES, in_file, is_position
 from vedette.internal.reading import read_text
 from vedette.internal.unit_warnings import suppress_unit_warnings
 from vedette.kernels.base.types import Floats
 from vedette.models import Bias, Region, SensorModel, TargetModel
-from vedette.models.arguments import reject
 from vedette.models.clutter import at_raw_measurements
 from vedette.recorded import RecordedScans
 from vedette.recorded.scan_times import Bearings, sensor_bias
 from vedette.scenarios.build import build_sensors
 from vedette.scenarios.dumping import dump_data
 from vedette.scenarios.loading import Scenario
+from vedette.scenarios.sections.base import GaussianMethod
 from vedette.scenarios.sections.recording import recorded_sensors
 from vedette.scenarios.sections.sensing import Clutter
 from vedette.scenarios.sections.sensors import Sensor
 from vedette.scenarios.yaml_reader import MAX_BYTES, read_yaml
 from vedette.tracking import Central, Tracker
 
-_LIMITS = Limits(min_existence=1e-3)
+# With wide gates, and components merged only if they are alike: where either changes, the likelihood jumps.
+_LIMITS = Limits(min_existence=1e-3, gate_probability=1.0 - 1e-12, merge_distance=0.5, max_components=20)
 # Standard deviations at and above which a parameter counts as unknown: of clocks, s; of logarithms, of log-odds.
 _UNKNOWN_CLOCK, _UNKNOWN_LOG, _UNKNOWN_ODDS = 5.0, 1.0, 4.0
 _WIDENING = 3.0  # times the region, along each axis: noise at its edge stays in it
@@ -45,10 +46,10 @@ _MIN_RATE, _MAX_PROBABILITY = 0.01, 0.98  # to start from
 def build_problem(scenario: Scenario, *, position: bool = False, bearings: Bearings | None = None) -> Problem:
     """Return the calibration problem of a recording: its sensors' parameters, to be estimated.
 
-    The parameters are biases of range, bearing and clock, noise, probability of detection and clutter rate, as far as
-    each sensor has them. Clocks are relative to that of the first sensor. The measurement of the first sensor is the
-    reference if all sensors measure positions; with `position`, so are its place and bearing. The likelihood is that
-    of an LMB filter with sequential updates, with the motion, survival and births of the scenario.
+    The parameters are biases of the measured quantities and of the clock, noise, probability of detection and clutter
+    rate, as far as each sensor has them. Clocks are relative to that of the first sensor. The measurement of the first
+    sensor is the reference if all sensors measure positions; with `position`, so are its place and bearing. The
+    likelihood is that of an LMB filter with sequential updates, with the motion, survival and births of the scenario.
 
     Args:
         scenario: from `vedette.scenarios.from_recording`; one of sensors alone, for future scans, has no recording.
@@ -57,14 +58,10 @@ def build_problem(scenario: Scenario, *, position: bool = False, bearings: Beari
     """
     model, folder = scenario.model, scenario.folder
     sites = tuple(recorded_sensors(model))
-    for site in sites:
-        if site.kind in HEIGHT_DEPENDENT:
-            expected = "measurements in the plane, as calibration knows no heights"
-            raise reject(f"sensor {site.name}", expected, site.kind)
     recording = RecordedScans(np.empty(0), 0.0, False, (), np.empty((0, len(sites), 3)), (), (bearings,) * len(sites))
     if model.recording is not None:
         recording = model.recording.build(model, folder, as_told=True)
-    parameters, only_positions = list[Parameter](), all(site.kind == "position" for site in sites)
+    parameters, only_positions = list[Parameter](), all(is_position(site.kind) for site in sites)
     for s, sensor in enumerate(model.sensors):
         if not recording.scans or any(scans[s] is not None for scans in recording.scans):
             clockwise = recording.bearings[s] == "north"
@@ -86,7 +83,9 @@ def build_problem(scenario: Scenario, *, position: bool = False, bearings: Beari
                 area = wide_region if sensor.clutter.kind == "region" else region
                 added_rates[s] = changes.get("rate", 0.0) - sensor.clutter.rate if changes else 0.0
                 sensor = sensor.model_copy(update={"clutter": sensor.clutter.model_copy(update=changes)})
-                built = sensor.build(area, method, folder, model.filter.detection_taken_at)
+                built = sensor.build(
+                    area, _smooth(method, sensor.measurement.kind), folder, model.filter.detection_taken_at
+                )
                 if sensor.clutter.kind in _SUPPORTED_CLUTTER:
                     raw = at_raw_measurements(built.clutter, *sensor_bias(biased[s], recording.bearings[s]))
                     built = replace(built, clutter=raw)
@@ -94,6 +93,15 @@ def build_problem(scenario: Scenario, *, position: bool = False, bearings: Beari
         return Central(SequentialLmbFilter(targets, tuple(models), _LIMITS)), added_rates
 
     return Problem(recording, sites, tuple(parameters), tracker)
+
+
+def _smooth(method: GaussianMethod, kind: str) -> GaussianMethod:
+    """Return a method without the switch of `auto`, for a kind of measurement that determines a place in the plane.
+
+    A switch makes the likelihood jump, and second differences take a jump for information. Other kinds need it: along
+    a direction that they leave open, or above a radar, they bend too much for sigma points.
+    """
+    return "ukf" if method == "auto" and kind in PLACED and kind not in HEIGHT_DEPENDENT else method
 
 
 def _births_per_scan(targets: TargetModel, times: Floats) -> TargetModel:
