@@ -5,8 +5,9 @@
 
 One radar, at rest or weaving, measures five ships of up to 10 m/s for five minutes. Its ranges are 80 m too long, and
 its bearings are turned by 0.5 degrees. The ships move with the process noise that the calibration assumes, or straight.
-Each run is another recording. Prints how many biases are reported, and their root mean square error. Equal arguments
-print equal tables.
+Each run is another recording. Prints how many biases are reported, their root mean square error, and how many
+intervals of each parameter cover the truth; of all with a 95 % interval of the share (Wilson). Equal arguments print
+equal tables.
 """
 
 from __future__ import annotations
@@ -47,18 +48,23 @@ def _weaving(amplitude: float) -> Callable[[float], np.ndarray]:
 
 
 class Arrangement(NamedTuple):
-    """Position of the radar over time, m; number of its random numbers; noise of the ships, and range rates."""
+    """Position of the radar over time, m; number of its random numbers; noise of the ships, and range rates.
+
+    known: the biases are given.
+    """
 
     course: Callable[[float], np.ndarray]
     stream: int
     noisy: bool = True
     doppler: bool = False
+    known: bool = False
 
 
 ARRANGEMENTS = {
     "at rest": Arrangement(_at(0.0, 0.0), 0),
     "at rest, straight ships": Arrangement(_at(0.0, 0.0), 1, noisy=False),
     "at rest, with range rates": Arrangement(_at(0.0, 0.0), 2, doppler=True),
+    "the same, biases given": Arrangement(_at(0.0, 0.0), 2, doppler=True, known=True),
     "weaves by 80 m": Arrangement(_weaving(80.0), 4),
     "weaves by 300 m": Arrangement(_weaving(300.0), 5),
 }
@@ -95,7 +101,8 @@ def write_recording(folder: Path, arrangement: Arrangement, rng: np.random.Gener
     text = TOLD.replace("KIND", "bearing_range_rate" if doppler else "bearing_range")
     text = text.replace("DOPPLER", ", sigma_range_rate: 0.6" if doppler else "")
     text = text.replace("CLUTTER", ", max_range_rate: 30.0" if doppler else "")
-    (folder / "radars.yaml").write_text(text + "  - {name: r0, position: [0, 0]}\n", "utf-8")
+    bias = f", bias: {{range: {FAR}, bearing_deg: {TURNED}}}" if arrangement.known else ""
+    (folder / "radars.yaml").write_text(f"{text}  - {{name: r0, position: [0, 0]{bias}}}\n", "utf-8")
 
 
 TRUTH = {"range": FAR, "bearing_deg": TURNED, "range_rate": 0.0, "noise.sigma_range": STDS[0]}
@@ -106,7 +113,8 @@ TRUTH |= {"detection.probability": 0.9, "clutter.rate": 2.0}
 def row(name: str, runs: int, first: int) -> str:
     """A row of the table."""
     arrangement = ARRANGEMENTS[name]
-    counts, errors = np.zeros((2, 2), np.int64), {key: list[float]() for key in _UNITS}
+    counts = {label: np.zeros(2, np.int64) for label in _LABELS}
+    errors = {key: list[float]() for key in _UNITS}
     for seed in range(first, first + runs):
         with tempfile.TemporaryDirectory() as place:
             write_recording(Path(place), arrangement, np.random.default_rng([seed, arrangement.stream]))
@@ -116,17 +124,32 @@ def row(name: str, runs: int, first: int) -> str:
             truth = TRUTH[each.parameter.name]
             if math.isnan(each.ci_low):
                 continue
-            counts[int(each.parameter.kind != "bias")] += each.ci_low <= truth <= each.ci_high, 1
+            label = "biases" if each.parameter.kind == "bias" else each.parameter.label
+            counts[label] += each.ci_low <= truth <= each.ci_high, 1
             if each.parameter.name in errors:
                 errors[each.parameter.name].append(each.value - truth)
-    shares = " | ".join(f"{a} of {b}" for a, b in counts)
-    return f"| {name} | {' | '.join(_told(errors[key], runs, unit) for key, unit in _UNITS.items())} | {shares} |"
+    shares = " | ".join(f"{a} of {b}" if b else "-" for a, b in counts.values())
+    covered = _share(*np.sum(list(counts.values()), axis=0).tolist())
+    biases = " | ".join(_told(errors[key], runs, unit) for key, unit in _UNITS.items())
+    return f"| {name} | {biases} | {shares} | {covered} |"
+
+
+_LABELS = ("biases", "bearing noise std", "range noise std", "range rate noise std", "detection prob.", "clutter rate")
+
+
+def _share(covers: int, num: int) -> str:
+    """Share in percent, and its interval of 95 % (Wilson 1927)."""
+    z, share = 1.96, covers / num
+    middle, reach = share + z * z / (2 * num), z * math.sqrt(share * (1.0 - share) / num + z * z / (4 * num * num))
+    low, high = ((middle + sign * reach) / (1.0 + z * z / num) for sign in (-1.0, 1.0))
+    return f"{100 * share:.0f} % ({100 * low:.0f} to {100 * high:.0f})"
 
 
 def table(runs: int, first: int) -> str:
     """The table, of that many recordings a row from that seed on."""
-    text = ["| radar | range bias | bearing bias | intervals of biases that cover | of other parameters |"]
-    text += ["| --- | --- | --- | ---: | ---: |", *(row(name, runs, first) for name in ARRANGEMENTS)]
+    text = [f"| radar | range bias | bearing bias | {' | '.join(_LABELS)} | all |"]
+    text += [f"| --- | --- | --- |{' ---: |' * (len(_LABELS) + 1)}"]
+    text += [row(name, runs, first) for name in ARRANGEMENTS]
     return "\n".join([*text, f"\n{runs} recordings of {SECONDS:.0f} s of each."])
 
 

@@ -59,6 +59,8 @@ def test_windows_are_printed_side_by_side_and_the_last_is_written(place: Path) -
 
 def test_a_search_that_did_not_converge_has_no_intervals(place: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("vedette.calibration.maximum_likelihood._MOST_STEPS", 1)
+    for limit in ("_ENOUGH", "_JUMPS"):
+        monkeypatch.setattr(f"vedette.calibration.maximum_likelihood.{limit}", 0.0)
     words = ("calibrate", "scans.csv", "--sensors", "radars.yaml", "--out", "found.yaml", "--overwrite")
     result = call(*words)
     assert result.exit_code == 3, result.output
