@@ -148,3 +148,24 @@ def test_radars_without_the_first_compare_their_ranges(tmp_path: Path) -> None:
     for s, truth in ((1, 80.0), (2, -60.0)):
         assert abs(found[s, "range"].value - truth) < 3.0 * found[s, "range"].std
         assert found[s, "range"].std < 20.0
+
+
+def test_the_noise_of_a_single_sensor_of_positions_is_estimated(tmp_path: Path) -> None:
+    """Only biases of positions need other sensors."""
+    rng, rows = np.random.default_rng(6), list[list[float]]()
+    for time in np.arange(0.0, 160.0, 4.0).tolist():
+        places = SHIPS[:, :2] + time * SHIPS[:, 2:]
+        rows += [[time, *(place + rng.normal(0.0, [30.0, 18.0])).tolist()] for place in places[rng.random(3) < 0.9]]
+    with (tmp_path / "scans.csv").open("w", newline="") as file:
+        csv.writer(file).writerows([["time", "x", "y"], *rows])
+    (tmp_path / "sensors.yaml").write_text(
+        "motion: {kind: constant_velocity, sigma_v: 0.05, noise_model: continuous_white}\n"
+        "sensors:\n  - {name: r, position: [0, 0], measurement: {kind: position}, clutter: {kind: region, rate: 0.1},\n"
+        "     noise: {kind: constant, std: [22.0, 22.0]}, detection: {kind: constant, probability: 0.8}}\n",
+        "utf-8",
+    )
+    problem = build_problem(scenario_from_recording(tmp_path / "sensors.yaml", tmp_path / "scans.csv").scenario)
+    found = calibrate(problem, only=[each for each in problem.parameters if each.kind == "noise"])
+    for each, true in zip(found.estimates, (30.0, 18.0), strict=True):
+        assert each.ci_low < true < each.ci_high
+        assert each.ci_high < 1.5 * each.ci_low

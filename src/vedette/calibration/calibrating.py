@@ -270,7 +270,7 @@ def _judged(
     found = []
     for i, (each, free) in enumerate(zip(problem.parameters, at.tolist(), strict=True)):
         partners = [j for j in np.flatnonzero(np.abs(lost[i]) > _PART).tolist() if j != i]
-        compared = each.sensor in apart and each.component in _COMPARED
+        compared = each.kind == "bias" and each.sensor in apart and each.component in _COMPARED
         if compared or lost[i, i] > _PART:
             why = _why(problem, i, [] if compared else partners, each.sensor in apart)
             found.append(ParameterEstimate(each, each.start, math.nan, math.nan, why))
