@@ -8,10 +8,12 @@ from typing import Any
 import pytest
 
 from reports.browser import Browser, Page, chromium
-from reports.test_browser import choose, state, text, wait_until
+from reports.test_browser import choose, scene_place, state, text, wait_until
 from reports.test_single import data_of, tracked
+from simulation.test_recorded_classes import recording_of
 from vedette.campaigns.results import CampaignResults
 from vedette.errors import InputError
+from vedette.evaluation import track_recording
 from vedette.evaluation.figures import video
 from vedette.evaluation.track_formats import utc_text
 from vedette.reports import write_demo, write_report, write_run_report
@@ -199,6 +201,19 @@ def test_a_recording_has_its_clock_and_its_names(browser: Browser, tmp_path: Pat
     assert "ship 1: at" in text(page, "rows")
     assert "from ship 1" in text(page, "rows")
     assert page.evaluate("document.querySelector('[data-part=beside]').parentElement.hidden")
+    assert page.complaints() == []
+
+
+def test_an_estimate_under_the_pointer_has_its_class(browser: Browser, tmp_path: Path) -> None:
+    found = recording_of(tmp_path)
+    write_run_report(track_recording(found.scenario, found.recording), found.scenario, tmp_path / "page.html")
+    page = browser.open(tmp_path / "page.html")
+    choose(page, "scrubber", "30")
+    page.point(*scene_place(page, "run.estimates[step].find((row) => row[2] > 0).slice(1, 3)"))
+    assert "; cargo 1.00" in text(page, "hover")
+    page.click("[data-part=values] summary")
+    wait_until(page, "document.querySelector('[data-part=rows]').childElementCount")
+    assert "; fishing 1.00" in text(page, "rows")
     assert page.complaints() == []
 
 

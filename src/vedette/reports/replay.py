@@ -65,6 +65,7 @@ def replay_data(strategy: Strategy, record: RunRecord, group: str, *, trust: boo
         "truth": [_targets(record, scan, decimals, has_velocity) for scan in range(record.num_scans)],
         "estimates": _estimates(record, scenario, decimals),
         **({"heights": _heights(record)} if scenario.model.has_heights else {}),
+        **({"classes": _classes(record, scenario)} if scenario.model.classes else {}),
         "poses": [
             [pose_data(pose, section, decimals) for pose, section in zip(poses, sections, strict=True)]
             for poses in record.poses
@@ -190,6 +191,15 @@ def _heights(record: RunRecord) -> dict[str, Any]:
         _, states = record.truth.at(scan)
         heights["truth"].append(rounded_list(states[:, HEIGHT], 0) if states.shape[1] > HEIGHT else [])
     return heights
+
+
+def _classes(record: RunRecord, scenario: Scenario) -> list[list[list[Any]]]:
+    """Return for each estimate of each scan its most probable class with the probability."""
+    names = list(scenario.model.classes)
+    return [
+        [[names[probs.argmax()], round(float(probs.max()), 3)] for probs in estimate.class_probs]
+        for estimate in record.estimates
+    ]
 
 
 def height_data(estimate: Estimate) -> list[list[float]]:

@@ -8,7 +8,7 @@ function describeAt(run, step, view, x, y, show) {
     if (near(east, north)) found.push(describeTarget(run, target, east, north, velocity) + heightWords(run.heights?.truth[step][place]));
   });
   run.estimates[step].forEach((estimate, place) => {
-    if (near(estimate[1], estimate[2])) found.push(describeEstimate(run, estimate) + heightWords(...(run.heights?.estimates[step][place] ?? [])));
+    if (near(estimate[1], estimate[2])) found.push(estimateInWords(run, step, place));
   });
   run.poses[step].forEach(([east, north, heading, pointing], s) => {
     if (near(east, north)) {
@@ -24,6 +24,8 @@ function describeAt(run, step, view, x, y, show) {
 
 const flightLevel = (height) => `FL${String(Math.max(0, Math.round(height / 30.48))).padStart(3, "0")}`;
 
+const classWords = (likeliest) => likeliest ? `; ${likeliest[0]} ${likeliest[1].toFixed(2)}` : "";
+
 function heightWords(height, std) {
   if (height === undefined) return "";
   return `; height ${fixed(height, 0)} m${std === undefined ? "" : ` \u00b1 ${fixed(std, 0)}`} (${flightLevel(height)})`;
@@ -33,6 +35,11 @@ function describeTarget(run, target, east, north, velocity) {
   const course = run.compass ? `, course ${directionOf(run, east, north, Math.atan2(velocity[1], velocity[0]))}\u00b0` : "";
   const speed = velocity.length > 1 ? `${course}, speed ${fixed(Math.hypot(velocity[0], velocity[1]), 1)} m/s` : "";
   return `${targetName(run, target)}: at ${metres(east, run)}, ${metres(north, run)}${speed}`;
+}
+
+function estimateInWords(run, step, place) {
+  const words = classWords(run.classes?.[step][place]) + heightWords(...(run.heights?.estimates[step][place] ?? []));
+  return describeEstimate(run, run.estimates[step][place]) + words;
 }
 
 function describeEstimate(run, [label, east, north, existence, long, short, , target, error]) {

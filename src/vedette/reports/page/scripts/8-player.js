@@ -110,9 +110,7 @@ function startReplay(root) {
       ...run().truth[state.step].map(([target, x, y, ...velocity], place) => (
         describeTarget(run(), target, x, y, velocity) + heightWords(run().heights?.truth[state.step][place])
       )),
-      ...run().estimates[state.step].map((estimate, place) => (
-        describeEstimate(run(), estimate) + heightWords(...(run().heights?.estimates[state.step][place] ?? []))
-      )),
+      ...run().estimates[state.step].map((_, place) => estimateInWords(run(), state.step, place)),
     ];
     part("rows").replaceChildren(...rows.map((text) => Object.assign(document.createElement("li"), { textContent: text })));
   }
