@@ -55,7 +55,7 @@ class LabelledDensity(MultiTarget):
     @property
     def num_classes(self) -> int:
         """Number of classes of targets; 0 if they have none."""
-        return self.tracks.num_classes
+        return int(self.tracks.log_class_probs.shape[1])
 
     @property
     @abstractmethod

@@ -56,9 +56,9 @@ def check_scan(scan: Any, sensor: SensorModel, num_classes: int) -> tuple[Floats
     if given.size == 0 and given.ndim <= 2:
         return np.empty((0, meas_dim)), _NO_ROWS
     brings_noise = given.ndim == 2 and given.shape[1] != meas_dim
-    with_noise = row_length(meas_dim)
-    if given.ndim != 2 or (brings_noise and given.shape[1] not in (with_noise, with_noise + num_classes)):
-        classes = f"; its targets have {num_classes} classes" if given.ndim == 2 and given.shape[1] > with_noise else ""
+    if given.ndim != 2 or (brings_noise and given.shape[1] - row_length(meas_dim) not in (0, num_classes)):
+        longer = given.ndim == 2 and given.shape[1] > row_length(meas_dim)
+        classes = f"; its targets have {num_classes} classes" if longer else ""
         raise InputError(f"scan: expected {expected}; got shape {given.shape}{classes}")
     array = np.array(given, dtype=np.float64, order="C")
     bad, is_below, largest, may_repeat = examined_scan(array, measurement.least, measurement.periods)

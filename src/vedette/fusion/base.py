@@ -187,11 +187,11 @@ def check_beliefs(beliefs: Sequence[Any], kinds: tuple[type, ...], num_sensors: 
     dims = [belief.state_dim for belief in beliefs]
     if len(set(dims)) > 1:
         raise InputError(f"beliefs: expected one state dimension at all sensors; got {dims}")
+    if isinstance(beliefs, PrevalidatedBeliefs) or all_valid(beliefs):
+        return
     numbers = [belief.num_classes for belief in beliefs]
     if len(set(numbers)) > 1:
         raise InputError(f"beliefs: expected one number of classes at all sensors; got {numbers}")
-    if isinstance(beliefs, PrevalidatedBeliefs) or all_valid(beliefs):
-        return
     for i, belief in enumerate(beliefs):
         try:
             belief.validate(error=InputError)
