@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from heights import KINDS, Aircraft, scene, track, write
 
-from vedette.errors import InputError, ScenarioError
+from vedette.errors import ScenarioError
 from vedette.evaluation import run_scenario, track_recording
 from vedette.evaluation.scans import scan_table, scans_of_record
 from vedette.evaluation.track_table import table_of_run, write_tracks
@@ -20,7 +20,6 @@ from vedette.recorded import Conventions, parse_scans
 from vedette.recorded.files import read_table
 from vedette.recorded.tables import Table
 from vedette.scenarios import load_scenario
-from vedette.scenarios.calibration import build_problem
 from vedette.scenarios.from_recording import scenario_from_recording, scenario_from_sensors
 from vedette.scenarios.loading import Scenario, parse_scenario
 from vedette.scenarios.sections.recording import recorded_sensors
@@ -188,13 +187,6 @@ def test_settings_incompatible_with_heights_are_reported(change: tuple[str, str]
         parse_scenario(text, "f.yaml")
     found = "\n".join(error.value.faults).replace(", got", "; got")
     assert wanted in found, found
-
-
-def test_calibration_refuses_heights(tmp_path: Path) -> None:
-    write(tmp_path, Aircraft(np.random.default_rng(0)), "bearing_slant_range", 2)
-    found = scenario_from_recording(tmp_path / "radars.yaml", tmp_path / "scans.csv")
-    with pytest.raises(InputError, match="sensor R: expected measurements in the plane"):
-        build_problem(found.scenario)
 
 
 def test_a_recording_with_heights_has_them_in_its_record(tmp_path: Path) -> None:
