@@ -117,7 +117,7 @@ def before_scan(
             std = np.concatenate([np.hypot(std[:2], longest_lag(pose) * std[2:4]), std[2:]])
         places = sensor.measurement.states_at(scan, pose, len(std))
     rate = 0.0 if learnt is None else learnt.rate
-    classes = birth.log_class_probs
+    classes = none.log_class_probs
     return Undetected(intensity, tables_of(undetected), found.cells, places, std, classes, step, index, rate)
 
 

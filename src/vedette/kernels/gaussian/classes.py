@@ -13,6 +13,7 @@ import numpy as np
 
 from vedette.kernels.base.compile import borrowing, inlined, kernel
 from vedette.kernels.base.types import Floats, Ints
+from vedette.kernels.gaussian.linalg import normalise_logs
 from vedette.kernels.gaussian.row_noise import num_class_ratios, row_length
 
 
@@ -28,20 +29,13 @@ def normalise_classes(log_class_probs: Floats) -> float:
 
     All are made equal if the sum is 0: any distribution can be used.
     """
-    num, peak, total = log_class_probs.shape[0], -math.inf, 0.0
+    num = log_class_probs.shape[0]
     if num == 0:
         return 0.0
-    for k in range(num):
-        peak = max(peak, log_class_probs[k])
-    if peak == -math.inf:
+    log_sum = normalise_logs(log_class_probs)
+    if log_sum == -math.inf:
         for k in range(num):
             log_class_probs[k] = -math.log(num)
-        return -math.inf
-    for k in range(num):
-        total += math.exp(log_class_probs[k] - peak)
-    log_sum = peak + math.log(total)
-    for k in range(num):
-        log_class_probs[k] -= log_sum
     return log_sum
 
 
