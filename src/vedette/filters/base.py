@@ -77,6 +77,11 @@ class WithBirths(SummaryRepr):
 
     __slots__ = ()
     targets: TargetModel
+    limits: Limits
+
+    def _limits(self, sensor: SensorModel) -> Limits:
+        """Return the limits of an update with a scan of a sensor."""
+        return self.limits.for_births(self.targets.birth, sensor.clutter.rate)
 
     def _births(self, dt: float, step: Any, prior: LabelledDensity | None, births: LMB | None) -> Lmb:
         """Return the labels born within the `dt` seconds before a step, detected or not; see `births_for`."""
@@ -243,7 +248,8 @@ class LabelledFilter(SingleSensorFilter, LabelledFilterBase[BeliefT]):
         place: str,
     ) -> tuple[BeliefT, FilterInfo]:
         try:
-            posterior, report = self._run_kernel(prior, SensorStep(inputs, self.limits, self.sensor, rng=rng))
+            step = SensorStep(inputs, self._limits(self.sensor), self.sensor, rng=rng)
+            posterior, report = self._run_kernel(prior, step)
         except Exception as error:
             raise_model_error(error)
             raise

@@ -23,7 +23,6 @@ from vedette.filters.region_births import (
     region_births,
     with_cells,
     with_deaths,
-    with_faint_candidates,
     with_learnt_rate,
 )
 from vedette.filters.undetected import (
@@ -43,6 +42,7 @@ from vedette.kernels.steps.factor_updates import Factoring
 from vedette.kernels.steps.factored import FactoredReport, step_factored
 from vedette.kernels.steps.field_of_view import in_view
 from vedette.kernels.steps.undetected import Arrivals
+from vedette.models import SensorModel
 from vedette.models.arguments import dimension, non_negative, one_of, step_number
 from vedette.models.fields import Count, L1Error
 
@@ -89,6 +89,9 @@ class _FactoredFilterBase(LabelledFilterBase[FactoredGLMB]):
     def _none(self) -> UndetectedTargets:
         return UndetectedTargets.none(self.targets.state_dim, self.targets.num_classes)
 
+    def _limits(self, sensor: SensorModel) -> Limits:
+        return self.limits if self.births == "poisson" else LabelledFilterBase._limits(self, sensor)
+
     def _births(self, dt: float, step: Any, prior: LabelledDensity | None, births: LMB | None) -> Lmb:
         if self.births == "labelled" or births is not None:
             return LabelledFilterBase._births(self, dt, step, prior, births)
@@ -127,7 +130,6 @@ class _FactoredFilterBase(LabelledFilterBase[FactoredGLMB]):
         before, undetected = no_undetected(birth), prior.undetected
         if undetected is not None:
             before = before_scan(undetected, birth, step.sensor, scan.measurements, scan.pose)
-            reduction = with_faint_candidates(reduction, undetected, birth)
         density, missed, left, report = step_factored(
             prior.density, before, prior.arrivals, *step.inputs, reduction, factoring
         )
@@ -149,11 +151,11 @@ class _FactoredFilterBase(LabelledFilterBase[FactoredGLMB]):
         whole = FactoredGLMB.from_kernel(posterior.density, undetected)
         found, dropped, is_full = self.limits.without_excess(whole)
         # If undetected targets are an intensity, dropped labels return to it: labels dropped by the caps still count as
-        # dropped, those below `min_existence` do not.
+        # dropped, those dropped by the kernel do not.
         if undetected is not None:
             undetected = with_learnt_rate(with_dropped(undetected, whole, found), whole, found, self.targets.birth)
-        lost = "dropped_existence" if undetected is None else "left_out"
-        dropped += sum(float(getattr(report, lost)) for report in reports)
+        else:
+            dropped += sum(float(report.dropped_existence) for report in reports)
         factoring = posterior.error + sum(float(report.split_error + 4.0 * report.taken_twice) for report in reports)
         belief = found if found.undetected is undetected else found.with_fields(undetected=undetected)
         return belief, FilterInfo(

@@ -17,6 +17,7 @@ from vedette.kernels.association.truncation import Truncation
 from vedette.kernels.base.types import Bools, Ints
 from vedette.kernels.gaussian.reduction import MixtureCaps
 from vedette.kernels.steps.lmb import Reduction
+from vedette.models.birth import BirthModel
 from vedette.models.fields import (
     Chance,
     Count,
@@ -29,6 +30,8 @@ from vedette.models.fields import (
     check_fields,
 )
 
+# Labels less probable than this share of the weakest birth have no effect on what later detections mean.
+_SHARE_OF_BIRTH = 0.1
 _Labelled = TypeVar("_Labelled", GLMB, LMB, FactoredGLMB)
 
 
@@ -53,8 +56,12 @@ class Limits:
             or CPHD filter, are dropped.
         merge_distance: Mahalanobis distance within which components of a track are merged; 0 merges none.
         max_components: largest number of components per track; 1 keeps one moment-matched Gaussian.
-        min_existence: labels of an LMB or alone in their factor, or Bernoullis, less probable than this are dropped.
-        max_labels: largest number of labels of an LMB or a factored density, or of Bernoullis of a multi-Bernoulli.
+        min_existence: labels of an LMB or alone in their factor, or Bernoullis, less probable than this are dropped,
+            but only if they do not change what later detections mean: if undetected targets are an intensity, if a
+            detection at their place is more probably of an undetected target; if births are labelled, if they are less
+            probable than a tenth of the weakest birth.
+        max_labels: largest number of labels of an LMB or a factored density, or of Bernoullis of a multi-Bernoulli; the
+            most probable ones are kept.
         max_position_std: labels whose position std exceeds this along both axes are dropped after the scan: targets
             without detections for a long time; infinite, in a file none: never [m].
         max_intensity_components: largest number of components of the intensity of a PHD or CPHD filter, over all
@@ -76,7 +83,7 @@ class Limits:
     merge_distance: NonNegative = 2.0
     max_components: Count = 10
     min_existence: Share = 1e-4
-    max_labels: Count = 200
+    max_labels: Count = 1000
     max_position_std: Limit = math.inf
     max_intensity_components: Count = 100
     max_existence: Chance = 0.999
@@ -106,14 +113,26 @@ class Limits:
         """Return the fields that bound hypotheses, in kernel form."""
         return _truncation(self, meas_dim)
 
+    def for_births(self, birth: BirthModel, clutter_rate: float) -> Limits:
+        """Return the limits of a filter with labelled births, which keep labels as improbable as a tenth of a birth.
+
+        clutter_rate: mean number of false measurements of a scan.
+        """
+        return _for_births(self, birth, float(clutter_rate))
+
     def track_caps(self) -> MixtureCaps:
         """Return the fields that bound the mixture of a track, in kernel form."""
         log_min_weight = math.log(self.min_component_weight) if self.min_component_weight > 0.0 else -math.inf
         return MixtureCaps(log_min_weight, float(self.merge_distance), int(self.max_components))
 
     def intensity_caps(self) -> MixtureCaps:
-        """Return `track_caps` with the cap of a whole intensity in place of a track's."""
-        return self.track_caps()._replace(max_components=int(self.max_intensity_components))
+        """Return `track_caps` with the cap of a whole intensity in place of a track's.
+
+        Components as improbable as the least existence are kept, since one target begins with each.
+        """
+        least = min(self.min_component_weight, self.min_existence)
+        log_least = math.log(least) if least > 0.0 else -math.inf
+        return MixtureCaps(log_least, float(self.merge_distance), int(self.max_intensity_components))
 
     def reduction(self) -> Reduction:
         """Return the fields that bound tracks and labels, in kernel form."""
@@ -170,6 +189,12 @@ def _truncation(limits: Limits, meas_dim: int) -> Truncation:
 @lru_cache(maxsize=1000)
 def _reduction(limits: Limits) -> Reduction:
     return Reduction(limits.track_caps(), logit(limits.min_existence), int(limits.max_labels))
+
+
+@lru_cache(maxsize=1000)
+def _for_births(limits: Limits, birth: BirthModel, clutter_rate: float) -> Limits:
+    faintest = _SHARE_OF_BIRTH * birth.least_existence(clutter_rate)
+    return limits if faintest >= limits.min_existence else replace(limits, min_existence=faintest)
 
 
 @lru_cache(maxsize=1000)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import replace
 from functools import lru_cache
 from typing import NamedTuple
@@ -21,7 +20,6 @@ from vedette.densities.checks import distinct_labels
 from vedette.densities.containers import for_kernel
 from vedette.densities.label_sets import are_in_table
 from vedette.kernels.base.types import Floats, Ints, Mixture
-from vedette.kernels.steps.lmb import Reduction
 from vedette.kernels.steps.undetected import Arrivals, Cells, Left
 from vedette.models import BirthModel, SurvivalModel, TargetModel, UndetectedModel
 from vedette.models.arguments import reject
@@ -194,18 +192,6 @@ def with_learnt_rate(
     counted = is_held & (shares > 0.0)
     learnt = replace(learnt, rate=rate, past=past, labels=labels[counted], shares=shares[counted])
     return replace(undetected, cells=UndetectedIntensity(cells.grid, expected), birth_rate=learnt)
-
-
-def with_faint_candidates(reduction: Reduction, undetected: UndetectedTargets, birth: BirthModel) -> Reduction:
-    """Return the reduction with a minimum existence of labels that falls with a learnt birth rate.
-
-    Otherwise, at a low rate, no measurement could start a label and none would be counted.
-    """
-    learnt, places = undetected.birth_rate, region_births(birth)
-    if learnt is None or places is None:
-        return reduction
-    log_share = min(0.0, math.log(learnt.rate / places.model.first_rate))
-    return reduction._replace(min_existence_logit=reduction.min_existence_logit + log_share)
 
 
 def _shares_of(learnt: LearntRate, labels: Ints) -> Floats:

@@ -91,7 +91,7 @@ class BirthModel:
 
     The label of a birth is (step, site index) (paper-notes 6). With a `period`, a site of birth probability r per
     period gives birth within dt seconds with probability 1 - (1 - r)^(dt / period), so the number of births in a time
-    span does not depend on the number of steps. The first scan counts as one second after a time without targets.
+    span does not depend on the number of steps. The first scan counts as one period after a time without targets.
 
     Attributes:
         existence: (num_sites,) birth probability of each site, in (0, 1).
@@ -164,6 +164,16 @@ class BirthModel:
     def is_active(self, step: int) -> bool:
         """Return True if targets may be born at the sites at this filter step."""
         return self.num_sites > 0 and (self.steps is None or step in self.steps)
+
+    def least_existence(self, clutter_rate: float) -> float:
+        """Return the least existence of a label of a filter with labelled births; 1 without births.
+
+        clutter_rate: mean number of false measurements of a scan; births from measurements are divided among them.
+        """
+        least, measured = float(self.existence.min(initial=1.0)), self.from_measurements
+        if measured is None or measured.is_learnt:
+            return least
+        return min(least, measured.max_existence, float(measured.expected) / (1.0 + clutter_rate))
 
     @classmethod
     def none(cls, state_dim: int) -> BirthModel:

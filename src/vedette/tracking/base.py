@@ -21,8 +21,8 @@ from vedette.kernels.base.types import Floats
 from vedette.models import SensorModel, TargetModel
 from vedette.models.arguments import float_array, one_a_sensor, real, reject
 
-# s. The belief before the first scan has no targets, so the length of the first prediction has no effect.
-FIRST_PERIOD = 1.0
+# s. Without a period of births, the length of the first prediction has no effect, as there are no targets before.
+_FIRST_PERIOD = 1.0
 NUMBER_BYTES = 8  # bytes; each symmetric matrix is sent as its triangle, without compression
 _NOTE_PREFIX = "stage: "
 
@@ -151,9 +151,13 @@ class TrackerWrapper:
 
 
 def check_step(
-    state: State, scans: Sequence[Any], poses: Any, time: float, rngs: Sequence[Any], num_sensors: int
+    state: State, scans: Sequence[Any], poses: Any, time: float, rngs: Sequence[Any], tracker: Tracker
 ) -> tuple[Floats, float]:
-    """Return the poses as an array and the seconds since the last scan; raise `InputError` as `Tracker.step` does."""
+    """Return the poses as an array and the seconds since the last scan, at the first scan the period of births.
+
+    Raises `InputError` as `Tracker.step` does.
+    """
+    num_sensors = len(tracker.sensors)
     if not isinstance(state, State):
         raise InputError(f"state: expected a State; got {type(state).__name__}")
     one_a_sensor(num_sensors, scans=scans, poses=poses, rngs=rngs)
@@ -161,7 +165,9 @@ def check_step(
     if state.time is not None and now < state.time:
         raise InputError(f"time: expected one from that of the last scan on, {state.time:g} s; got {now:g}")
     pose_array = float_array("poses", poses, (num_sensors, None))
-    return pose_array, FIRST_PERIOD if state.time is None else now - state.time
+    if state.time is None:
+        return pose_array, tracker.targets.birth.period or _FIRST_PERIOD
+    return pose_array, now - state.time
 
 
 class StageTimer:

@@ -33,9 +33,11 @@ from vedette.kernels.gaussian.relinearisation import make_pair_work
 from vedette.kernels.gaussian.scratch import make_scratch
 
 _LEAST_SHARE = math.log(1e-5)  # least share of a component of the intensity in a candidate's density
-# A candidate at a measurement that is unclaimed with less than this probability needs ten times the usual odds:
-# otherwise it would remain as an improbable second label of a tracked target.
-_LOG_CLAIMED, _LOG_WORTH = math.log(0.05), math.log(10.0)
+# A measurement begins a label if that would have the least odds, or if no track takes it with at least the probability
+# _LOG_FREE: then nothing else explains it but clutter, however rare births are. At a measurement that is unclaimed with
+# less than _LOG_CLAIMED the label needs ten times the least odds: otherwise it would remain as an improbable second
+# label of a tracked target.
+_LOG_FREE, _LOG_CLAIMED, _LOG_WORTH = math.log(0.1), math.log(0.05), math.log(10.0)
 
 
 class Candidates(NamedTuple):
@@ -43,8 +45,8 @@ class Candidates(NamedTuple):
 
     rows: Rows
     options: Options
-    log_left_out: float  # log of the factor by which candidates below the least odds would raise the total weight
-    left_out: float  # their expected number
+    log_left_out: float  # log of the factor by which measurements without a candidate would raise the total weight
+    left_out: Floats  # (num_seen,) expected number of targets first detected by them, by component of the intensity
 
 
 class _Pairs(NamedTuple):
@@ -73,11 +75,11 @@ def seen_intensity(intensity: Mixture, scan: ScanInput, sensor: Sensor) -> Rows:
 
 
 @kernel
-def missed_intensity(seen: Rows, scan: ScanInput, sensor: Sensor, num: int) -> tuple[Mixture, float]:
-    """Return the intensity of the targets that the scan did not detect, and the log probability of no detection at all.
+def missed_intensity(seen: Rows, scan: ScanInput, sensor: Sensor, num: int, left_out: Floats) -> tuple[Mixture, float]:
+    """Return the intensity of the targets without a label, and the log probability of no first detection at all.
 
-    num: number of components of the intensity. The log probability is minus the integral of P_D D, as the number of
-    detections is Poisson.
+    num: number of components of the intensity. left_out: as in `Candidates`. The log probability is minus the integral
+    of P_D D, as the number of detections is Poisson.
     """
     components = seen.components
     out, expected, state = components_like(components, num), 0.0, np.empty(components.means.shape[1])
@@ -85,7 +87,9 @@ def missed_intensity(seen: Rows, scan: ScanInput, sensor: Sensor, num: int) -> t
         detected = seen.innovation.prob_detection[c]
         expected += math.exp(components.log_weights[c]) * detected
         copy_component(components, c, out, c)
-        out.log_weights[c] += log_or_minus_inf(1.0 - detected)
+        out.log_weights[c] = log_add(
+            out.log_weights[c] + log_or_minus_inf(1.0 - detected), log_or_minus_inf(left_out[c])
+        )
         if seen.innovation.at_edge[c]:
             mean, cov = components.means[c], components.covs[c]
             moments_if_missed(sensor, scan.pose, mean, cov, state, out.means[c], out.covs[c])
@@ -124,25 +128,31 @@ class _Chosen(NamedTuple):
 
 
 @kernel
-def _chosen(pairs: _Pairs, unclaimed: Floats, least_logit: float) -> tuple[_Chosen, float, float]:
-    """Return the candidates, and `log_left_out` and `left_out` of `Candidates`. unclaimed: see `log_unclaimed`."""
+def _chosen(pairs: _Pairs, unclaimed: Floats, least_logit: float, left_out: Floats) -> tuple[_Chosen, float]:
+    """Return the candidates, and `log_left_out` of `Candidates`.
+
+    unclaimed: see `log_unclaimed`. left_out: as in `Candidates`, zeros; written.
+    """
     num_measurements = len(unclaimed)
     offsets, members = group_members(pairs.measurements, num_measurements)
     log_odds, kept = np.full(num_measurements, -math.inf), np.empty(num_measurements, np.int64)
-    num_kept, num_pairs, log_left_out, left_out = 0, 0, 0.0, 0.0
+    num_kept, num_pairs, log_left_out = 0, 0, 0.0
     for j in range(num_measurements):
         for i in range(offsets[j], offsets[j + 1]):
             log_odds[j] = log_add(log_odds[j], pairs.log_odds[members[i]])
         left = log_odds[j] + unclaimed[j]
         least = least_logit + (_LOG_WORTH if unclaimed[j] < _LOG_CLAIMED else 0.0)
-        if left >= least and left > -math.inf:
+        if left > -math.inf and (left >= least or unclaimed[j] >= _LOG_FREE):
             kept[num_kept] = j
             num_kept += 1
             num_pairs += offsets[j + 1] - offsets[j]
         elif left > -math.inf:
             log_left_out += log_add(0.0, left)
-            left_out += 1.0 / (1.0 + math.exp(-left))
-    return _Chosen(kept[:num_kept], num_pairs, offsets, members, log_odds), log_left_out, left_out
+            existence = 1.0 / (1.0 + math.exp(-left))
+            for i in range(offsets[j], offsets[j + 1]):
+                pair = members[i]
+                left_out[pairs.components[pair]] += existence * math.exp(pairs.log_odds[pair] - log_odds[j])
+    return _Chosen(kept[:num_kept], num_pairs, offsets, members, log_odds), log_left_out
 
 
 @kernel
@@ -173,7 +183,8 @@ def candidates_of(
     """
     sight = Sight(sensor, scan.pose, make_pair_work(seen.components.means.shape[1], len(sensor.periods)))
     pairs = _gated_pairs(seen, num_local, scan.measurements, log_clutter, sight, gate)
-    chosen, log_left_out, left_out = _chosen(pairs, unclaimed, least_logit)
+    left_out = np.zeros(len(seen.log_absent))
+    chosen, log_left_out = _chosen(pairs, unclaimed, least_logit, left_out)
     num, meas_dim = len(chosen.measurements), len(sensor.periods)
     rows = make_rows(num, chosen.num_pairs, seen.components, meas_dim)
     updated = room_for_updated(seen, chosen.num_pairs)

@@ -16,7 +16,7 @@ from vedette.kernels.gaussian.components import (
     own_components,
     stacked_mixtures,
 )
-from vedette.kernels.gaussian.linalg import cholesky, inverse_from_factor, log_det_from_factor
+from vedette.kernels.gaussian.linalg import cholesky, inverse_from_factor, log_det_from_factor, log_sum
 from vedette.kernels.gaussian.mixtures import descending_order
 from vedette.kernels.gaussian.prediction import predict
 from vedette.kernels.gaussian.scratch import make_scratch
@@ -24,7 +24,7 @@ from vedette.kernels.gaussian.scratch import make_scratch
 # Twice the Kullback-Leibler divergence up to which a component is merged with a heavier one, and the factor by which
 # this grows until few enough are left.
 _REACH, _GROWTH = 0.1, 3.0
-_LIGHTEST = 1e-9  # expected number of targets below which a component is merged with whatever is near, or dropped
+_LIGHTEST = 1e-9  # share of the intensity below which a component is dropped, and its number shared out
 
 
 @kernel
@@ -119,18 +119,23 @@ def _merged(mixture: Mixture, reach: float) -> Mixture:
 def condensed(intensity: Mixture, max_components: int) -> Mixture:
     """The intensity in at most `max_components` components.
 
-    Components that say nearly the same are merged; where there are still too many, those that differ more and more.
-    Components lighter than a billionth of a target are dropped.
+    Similar components are merged; where there are still too many, less and less similar ones. Components lighter than a
+    billionth of the intensity are dropped, and the others raised to the same total.
     """
     found, reach = _merged(intensity, _REACH), _REACH
+    total = log_sum(found.log_weights)
     while len(found.log_weights) > max_components:
         reach *= _GROWTH
         found = _merged(found, reach)
-    lightest, kept = math.log(_LIGHTEST), 0
+    lightest, kept = total + math.log(_LIGHTEST), 0
     for c in range(len(found.log_weights)):
         if found.log_weights[c] < lightest:
             continue
         if kept < c:
             copy_component(found, c, found, kept)
         kept += 1
-    return own_components(found, kept)
+    out = own_components(found, kept)
+    rise = total - log_sum(out.log_weights)
+    for c in range(kept):
+        out.log_weights[c] += rise
+    return out

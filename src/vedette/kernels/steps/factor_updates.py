@@ -9,7 +9,7 @@ import numpy as np
 
 from vedette.kernels.association.assignment import ABSENT, Options
 from vedette.kernels.association.children import Children, make_children
-from vedette.kernels.association.predicted import Rows
+from vedette.kernels.association.predicted import Rows, log_or_minus_inf
 from vedette.kernels.association.ranked import Ranking, ranked
 from vedette.kernels.association.search import make_search
 from vedette.kernels.association.totals import ROUNDING, log_heaviest_left, log_weight_bound
@@ -29,6 +29,7 @@ from vedette.kernels.steps.assembly import assemble
 from vedette.kernels.steps.factor_groups import Group
 from vedette.kernels.steps.glmb import kept_children
 from vedette.kernels.steps.lmb import Reduction, append_reduced, write_mixture
+from vedette.kernels.steps.undetected import Undetected, outweighs_undetected
 
 # Indices of the sums of a scan; see `FactoredReport`.
 TOTAL, KEPT, TWICE, SPLIT, DROPPED, CUT, FULL, REDUCED = range(8)
@@ -36,10 +37,6 @@ _NUM_SUMS = 8
 
 # A component of a label that is alone is dropped if its expected number of targets is below this times the least share.
 _WORTH = 10.0
-
-# Dropped labels return to the undetected targets if their existence is at least a tenth of the least existence: less
-# probable ones would add a component for every recent false measurement.
-_LOG_RETURNED = math.log(10.0)
 
 # A posterior is condensed if the hypotheses beyond the share _KEPT_APART of the longest list weigh more than
 # _MOST_BEHIND: the next scan has many times as many, and most of those cut off hold more targets than those kept. The
@@ -68,12 +65,13 @@ class Work(NamedTuple):
     claimed: Floats  # (num_measurements,) expected number of groups that take each
     sums: Floats  # (_NUM_SUMS,)
     reducing: ReductionWork  # for the number of components of `wide`
+    undetected: Undetected  # at the time of the scan, before it
     faint: Mixture  # one Gaussian of each dropped label, weighted by its existence
     num_faint: Ints  # (1,) their number
 
 
 @kernel
-def make_work(rows: Rows, options: Options) -> Work:
+def make_work(rows: Rows, options: Options, undetected: Undetected) -> Work:
     widest = 0
     for row in range(len(rows.log_absent)):
         num_options = options.offsets[row + 1] - options.offsets[row]
@@ -86,6 +84,7 @@ def make_work(rows: Rows, options: Options) -> Work:
         np.zeros(options.num_measurements),
         np.zeros(_NUM_SUMS),
         make_reduction_work(widest, rows.components),
+        undetected,
         components_like(rows.components, len(rows.log_absent)),
         np.zeros(1, np.int64),
     )
@@ -108,18 +107,21 @@ def _append_mixture(
     reducing: ReductionWork,
     work: Work,
 ) -> None:
-    """Append a label as a factor unless it is too improbable. The store must have room. reducing: working arrays."""
+    """Append a label as a factor, unless it is improbable and without effect on what later detections mean.
+
+    The store must have room. reducing: working arrays.
+    """
     existence = 1.0 / (1.0 + math.exp(-logit))
     start, caps = next_component(store), reduction.mixture
     if logit < reduction.min_existence_logit:
-        work.sums[DROPPED] += existence
-        if logit > reduction.min_existence_logit - _LOG_RETURNED:
-            k, faint = work.num_faint[0], work.faint
-            one = MixtureCaps(caps.log_min_weight, caps.merge_distance, 1)
-            reduce_into(wide, width, one, reducing, faint, k)
-            faint.log_weights[k] = math.log(existence)
+        k, faint = work.num_faint[0], work.faint
+        one = MixtureCaps(caps.log_min_weight, caps.merge_distance, 1)
+        reduce_into(wide, width, one, reducing, faint, k)
+        if not outweighs_undetected(existence, faint.means[k], faint.covs[k], work.undetected):
+            faint.log_weights[k] = log_or_minus_inf(existence)
+            work.sums[DROPPED] += existence
             work.num_faint[0] += 1
-        return
+            return
     # An improbable label keeps few components, to save time.
     log_least = min(0.0, caps.log_min_weight + math.log(_WORTH / existence))
     caps = MixtureCaps(log_least, caps.merge_distance, caps.max_components)

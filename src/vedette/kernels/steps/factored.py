@@ -27,7 +27,7 @@ from vedette.kernels.association.predicted import Rows, rows_of_scan
 from vedette.kernels.association.truncation import Truncation
 from vedette.kernels.base.arrays import group_members
 from vedette.kernels.base.compile import kernel
-from vedette.kernels.base.types import FactoredGlmb, Mixture, Motion, ScanInput, Sensor
+from vedette.kernels.base.types import FactoredGlmb, Floats, Mixture, Motion, ScanInput, Sensor
 from vedette.kernels.gaussian.components import stacked_mixtures
 from vedette.kernels.gaussian.mixtures import require_gaussians
 from vedette.kernels.labelled.factor_store import has_room_for_single, make_store, stored, with_room
@@ -62,9 +62,11 @@ from vedette.kernels.steps.undetected import (
     Arrivals,
     Left,
     Undetected,
+    add_to_cells,
     intensity_at_places,
     left_in_cells,
     predicted_undetected,
+    with_returned,
 )
 
 
@@ -80,8 +82,7 @@ class FactoredReport(NamedTuple):
     taken_twice: float  # upper bound on the probability that factors of two groups take one measurement
     split_error: float  # summed L1 error of the splits
     reduction_error: float  # summed L1 bound of the changes by merged versions and reduced mixtures
-    dropped_existence: float  # summed existence of dropped labels
-    left_out: float  # expected number of targets among first detections that are not candidates
+    dropped_existence: float  # summed existence of labels that were dropped, and returned to the undetected targets
     most_labels: int  # of a group
 
 
@@ -94,7 +95,7 @@ class _Associated(NamedTuple):
     seen: Rows  # the undetected targets
     log_clutter: float  # as in `FactoredReport`
     num_raised: int
-    left_out: float
+    left_out: Floats  # as in `Candidates`
     log_left_out: float  # as in `Candidates`
 
 
@@ -131,6 +132,7 @@ def _associate(
 @kernel
 def _update_groups(
     prior: FactoredGlmb,
+    undetected: Undetected,
     found: _Associated,
     truncation: Truncation,
     reduction: Reduction,
@@ -147,7 +149,7 @@ def _update_groups(
     leaders = linked_factors(options, alone, factors.row_offsets, sizes, factoring.max_cut, factoring.max_together)
     log_twice = apply_contention(options, groups_of_rows(factors, leaders), alone, rows.offsets)
     offsets, members = group_members(leaders, len(leaders))
-    work, ranking, most_labels = make_work(rows, options), make_ranking(), 0
+    work, ranking, most_labels = make_work(rows, options, undetected), make_ranking(), 0
     widest = len(work.wide.log_weights)
     store = make_store(len(rows.log_absent), 2 * len(rows.components.log_weights), rows.components)
     for leader in range(len(leaders)):
@@ -188,14 +190,16 @@ def step_factored(
     if motion is not None:
         undetected = predicted_undetected(undetected, motion, scan.dt, arrivals)
     found = _associate(prior, undetected, scan, motion, sensor, truncation, reduction.min_existence_logit)
-    density, work, log_twice, most_labels = _update_groups(prior, found, truncation, reduction, factoring)
+    density, work, log_twice, most_labels = _update_groups(prior, undetected, found, truncation, reduction, factoring)
     require_gaussians(density.tracks.components.means, density.tracks.components.covs)
-    missed, log_missed = missed_intensity(found.seen, scan, sensor, len(undetected.intensity.log_weights))
+    num = len(undetected.intensity.log_weights)
+    missed, log_missed = missed_intensity(found.seen, scan, sensor, num, found.left_out)
     left, sums = left_in_cells(undetected, sensor, scan.pose), work.sums
     log_missed += left.changes[0] if len(left.changes) > 0 else 0.0
+    add_to_cells(left.tables, undetected.cells, undetected.places, found.left_out[num:])
     return (
         density,
-        stacked_mixtures(missed, found_faint(work)),
+        with_returned(missed, left.tables, undetected.cells, found_faint(work)),
         left,
         FactoredReport(
             sums[TOTAL] + log_twice + log_missed + found.log_left_out,
@@ -208,7 +212,6 @@ def step_factored(
             sums[SPLIT],
             sums[REDUCED],
             sums[DROPPED],
-            found.left_out,
             most_labels,
         ),
     )
