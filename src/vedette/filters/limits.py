@@ -30,8 +30,9 @@ from vedette.models.fields import (
     check_fields,
 )
 
-# Labels less probable than this share of the weakest birth have no effect on what later detections mean.
+# Labels and hypotheses less probable than this share of the weakest birth have no effect on what later detections mean.
 _SHARE_OF_BIRTH = 0.1
+_RELATIVE_TO_BIRTHS = ("min_existence", "min_relative_weight", "min_track_weight")
 _Labelled = TypeVar("_Labelled", GLMB, LMB, FactoredGLMB)
 
 
@@ -42,8 +43,9 @@ class Limits:
     Attributes:
         max_hypotheses: largest number of hypotheses, for a factored density in each factor; for an LMB, of joint
             choices summed in a cluster too large for the exact sum.
-        min_relative_weight: hypotheses lighter than this times the heaviest are dropped; in a CPHD filter the large
-            numbers of targets less probable than this times the most probable.
+        min_relative_weight: hypotheses lighter than this times the heaviest are dropped, with labelled births only if
+            this share is below a tenth of the weakest birth; in a CPHD filter the large numbers of targets less
+            probable than this times the most probable.
         min_track_weight: for every label and each association with the scan (missed, or detected as a given
             measurement), the heaviest such hypothesis is kept, in up to half of `max_hypotheses`, while its weight is
             at least this times the heaviest of all; 1 switches this off. Without it, a target whose first measurements
@@ -114,7 +116,7 @@ class Limits:
         return _truncation(self, meas_dim)
 
     def for_births(self, birth: BirthModel, clutter_rate: float) -> Limits:
-        """Return the limits of a filter with labelled births, which keep labels as improbable as a tenth of a birth.
+        """Return the limits of a filter with labelled births, which keep what is as improbable as a tenth of a birth.
 
         clutter_rate: mean number of false measurements of a scan.
         """
@@ -194,7 +196,8 @@ def _reduction(limits: Limits) -> Reduction:
 @lru_cache(maxsize=1000)
 def _for_births(limits: Limits, birth: BirthModel, clutter_rate: float) -> Limits:
     faintest = _SHARE_OF_BIRTH * birth.least_existence(clutter_rate)
-    return limits if faintest >= limits.min_existence else replace(limits, min_existence=faintest)
+    names = [name for name in _RELATIVE_TO_BIRTHS if faintest < getattr(limits, name) < 1.0]
+    return replace(limits, **dict.fromkeys(names, faintest)) if names else limits
 
 
 @lru_cache(maxsize=1000)
