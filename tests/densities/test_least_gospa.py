@@ -43,7 +43,7 @@ def logits(existence: Any) -> Any:
 @pytest.mark.parametrize("order", [1.0, 2.0])
 def test_no_set_of_points_has_a_lower_expected_gospa(order):
     """All subsets of the means of labels and of their components, over samples of the true targets."""
-    for seed in range(6):
+    for seed in range(4):
         rng = np.random.default_rng(seed)
         num, sizes = 3, rng.integers(1, 3, 3)
         offsets = np.concatenate([[0], np.cumsum(sizes)])
@@ -60,7 +60,7 @@ def test_no_set_of_points_has_a_lower_expected_gospa(order):
             choices.append([None, *own, weight @ own])
         truths = np.full((2000, num, 2), np.nan)
         for sample in truths:
-            for i in np.flatnonzero(rng.random(num) < existence):
+            for i in np.flatnonzero(rng.random(num) < existence).tolist():
                 j = int(offsets[i] + rng.choice(sizes[i], p=weights[i]))
                 sample[i] = rng.multivariate_normal(means[j], covs[j])
         found = power_of_gospa(least_gospa_estimate(density, CUTOFF, order).means, truths, order)
