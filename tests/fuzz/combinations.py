@@ -51,7 +51,9 @@ def combination(rng: Rng) -> Data:
     }
     data["fusion"] = _fusion(rng, len(sensors), data["filter"]["kind"])
     data |= {
-        "estimator": pick(rng, [{"kind": "map"}, {"kind": "map"}, {"kind": "marginal"}, own_part("sure")]),
+        "estimator": pick(
+            rng, [*({"kind": kind} for kind in ("map", "map", "marginal", "least_gospa")), own_part("sure")]
+        ),
         "metrics": pick(rng, [{}, {"share": {"kind": "tracked_fraction"}}, {"count": own_part("count")}]),
     }
     if rng.random() < 0.25:

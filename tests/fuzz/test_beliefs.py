@@ -107,6 +107,7 @@ def one_case(rng: np.random.Generator) -> None:
     ]
     if kind < 2:
         uses += [lambda: d.map_estimate(spoilt), lambda: d.marginal_estimate(spoilt)]
+        uses.append(lambda: d.least_gospa_estimate(spoilt))
         uses.append(lambda: (CmDeltaGlmb if kind == 0 else Clmb)((0.5, 0.5)).fuse([spoilt, belief])[0])
         uses.append(lambda: d.as_lmb(spoilt) if kind == 0 else d.as_glmb(spoilt, max_hypotheses=5)[0])
     if kind < 3:
@@ -145,6 +146,7 @@ def one_product(rng: np.random.Generator) -> None:
     uses: list[Any] = [
         lambda: d.map_estimate(spoilt),
         lambda: d.marginal_estimate(spoilt),
+        lambda: d.least_gospa_estimate(spoilt),
         lambda: d.as_lmb(spoilt),
         lambda: d.as_glmb(spoilt, max_hypotheses=5)[0],
         lambda: d.marginalise(spoilt),

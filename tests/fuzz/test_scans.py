@@ -24,6 +24,7 @@ from vedette.densities import (
     Poisson,
     as_glmb,
     as_lmb,
+    least_gospa_estimate,
     map_estimate,
     marginal_estimate,
     marginalise,
@@ -65,6 +66,9 @@ def _check_readings(rng: np.random.Generator, belief: Any) -> None:
     if isinstance(belief, GLMB | LMB):
         map_estimate(belief).validate()
         marginal_estimate(belief, scenes.one_of(rng, 0.0, 0.5, 0.999)).validate()
+        least_gospa_estimate(
+            belief, scenes.one_of(rng, 1e-3, 100.0, 1e9), scenes.one_of(rng, 1.0, 2.0, 400.0)
+        ).validate()
     else:
         unlabelled_estimate(belief, 3).validate()
     if isinstance(belief, GLMB):

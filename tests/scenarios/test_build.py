@@ -20,7 +20,7 @@ from vedette.control import (
     JointPlanner,
     RenyiReward,
 )
-from vedette.densities import GLMB, LMB
+from vedette.densities import GLMB, LMB, least_gospa_estimate
 from vedette.errors import InputError, ScenarioError
 from vedette.filters import (
     CbMemberFilter,
@@ -353,6 +353,48 @@ def test_the_marginal_estimator_has_its_threshold() -> None:
     estimate = MarginalEstimator(threshold=0.9).build(Path())
     for empty in (GLMB.empty(4), LMB.empty(4)):
         assert len(estimate(empty, 1).labels) == 0
+
+
+GOSPA_REWARD = ("decision_steps: [4, 8]}", "decision_steps: [4, 8], reward: {kind: expected_gospa, cutoff: 30.0}}")
+
+
+@pytest.mark.parametrize(
+    ("filters", "changes", "kind"),
+    [
+        ("factored_glmb", [], "least_ospa"),
+        ("factored_glmb", [GOSPA_REWARD], "least_gospa"),
+        ("m_delta_glmb", [GOSPA_REWARD], "map"),
+        ("lmb", [], "map"),
+    ],
+)
+def test_the_default_estimator_follows_filter_and_reward(filters: str, changes: Any, kind: str) -> None:
+    fusion = "{kind: cm_delta_glmb, weights: [0.5, 0.5]}", "{kind: sequential}"
+    loaded = scenario(
+        ("kind: m_delta_glmb", f"kind: {filters}"),
+        fusion,
+        ("estimator: {kind: marginal, threshold: 0.6}\n", ""),
+        *changes,
+    )
+    assert loaded.model.estimates_by.kind == kind
+    given = replace_fields(loaded, {"estimator": {"kind": "marginal"}})
+    assert given.model.estimates_by.kind == "marginal"
+    assert replace_fields(given, {"estimator": None}).model.estimates_by.kind == kind
+
+
+@pytest.mark.parametrize(
+    ("given", "cutoff", "order"),
+    [("", 50.0, 1.0), (", order: 2.0", 50.0, 2.0), (", cutoff: 9.0, order: 3.0", 9.0, 3.0)],
+)
+def test_the_estimator_of_least_gospa_has_the_scores_cutoff_and_order(given: str, cutoff: float, order: float) -> None:
+    loaded = scenario(("{kind: marginal, threshold: 0.6}", f"{{kind: least_gospa{given}}}"))
+    section = loaded.model.estimates_by
+    assert (section.cutoff, section.order) == (cutoff, order)
+    assert ("estimate", f"least gospa, cutoff {cutoff:g} m, order {order:g}") in summary_rows(loaded.model)
+    belief = LMB.from_bernoullis([(1, 0)], [0.8], np.zeros((1, 4)), [np.eye(4) * 144.0])
+    wanted = least_gospa_estimate(belief, cutoff, order)
+    assert len(section.build(Path())(belief, 1)) == len(wanted) == (cutoff == 50.0)
+    rebuilt = replace_fields(loaded, {"ospa.cutoff": 200.0})
+    assert rebuilt.model.estimates_by.cutoff == (200.0 if cutoff == 50.0 else 9.0)
 
 
 def test_actions_of_one_sensor_and_of_all() -> None:

@@ -227,6 +227,9 @@ kind: cm_delta_glmb, weights: [0.5, 0.5] -> kind: sequential, feedback: true
     20:38: fusion.feedback: expected false, as nothing is fused while tracking, got true
 threshold: 0.6 -> threshold: 1.0
     21:40: estimator.threshold: expected a number below 1, got 1.0
+kind: marginal, threshold: 0.6 -> kind: least_gospa, cutoff: 0, order: 0.5
+    21:40: estimator.cutoff: expected a number above 0, got 0
+    21:50: estimator.order: expected a number of at least 1, got 0.5
 decision_steps: [4, 8] -> decision_steps: [4, 25]
     22:31: control.decision_steps[1]: expected a step up to the last, 20, got 25
 decision_steps: [4, 8] -> decision_steps: [8, 4]

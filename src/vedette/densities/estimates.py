@@ -17,20 +17,29 @@ from vedette.densities.inspection import Target, Targets
 from vedette.densities.labelled import LMB, LabelledDensity
 from vedette.densities.multi_bernoulli import MultiBernoulli
 from vedette.densities.statistics import cardinality_distribution, check_labelled
-from vedette.densities.tracks import TrackTable, gaussian_tracks, heaviest_components, mean_class_probs, take_tracks
+from vedette.densities.tracks import (
+    TrackTable,
+    gaussian_tracks,
+    heaviest_components,
+    mean_class_probs,
+    take_tracks,
+    track_moments,
+)
 from vedette.densities.unlabelled import IidCluster, Poisson
 from vedette.errors import InputError, NumericalError, VedetteError
 from vedette.internal.representation import TabularRepr
 from vedette.internal.text import pluralise
 from vedette.kernels.base.types import Floats, Ints
+from vedette.kernels.gaussian.position_integrals import spread_nodes
 from vedette.kernels.labelled.heaviest import map_tracks
 from vedette.kernels.labelled.least_ospa import least_ospa_tracks
-from vedette.models.arguments import no_gaussians
+from vedette.models.arguments import no_gaussians, positive, reject
 
 _MARGINAL_COMPONENTS = 10
 # A component of weight 1.5 to 2 is more often one target that fits two measurements than two targets
 # (docs/evidence/estimates.md).
 _RANK_OF_HALF_LEFT = 0.2
+_NODES = spread_nodes()[:, 1:]
 
 
 @dataclass(frozen=True, slots=True, repr=False)
@@ -151,6 +160,37 @@ def least_ospa_estimate(density: LabelledDensity) -> Estimate:
     """
     given = check_labelled(density)
     return _peaks(given.tracks, *least_ospa_tracks(given.to_factors()))
+
+
+def least_gospa_estimate(density: LabelledDensity, cutoff: float = 100.0, order: float = 1.0) -> Estimate:
+    """Return the targets of least expected GOSPA^p (alpha = 2) of positions, if each is matched by its label.
+
+    A label of existence r is reported if r e + (1 - r) / 2 < r / 2. Its point is the mean of its density or of a
+    component, whichever has the least e, the mean of (min(distance, c) / c)^p, by 64 nodes a component. The labels are
+    those of `resolve_labels`. The cost minimised is an upper bound, as GOSPA may match a target with the estimate of
+    another label. It is exact if no estimate is within c of another label's possible positions.
+    Raises `InputError` unless the cutoff c (m) is above 0 and the order p at least 1.
+    """
+    cutoff, order = positive("cutoff", cutoff), positive("order", order)
+    if order < 1.0:
+        raise reject("order", "a number of at least 1", order)
+    lmb = resolve_labels(check_labelled(density), max_components=_MARGINAL_COMPONENTS)
+    likely = np.flatnonzero(lmb.existence > 0.5)  # others are not reported even if e is 0
+    tracks, existence = take_tracks(lmb.tracks, likely), lmb.existence[likely]
+    (means, covs), errors = track_moments(tracks), np.empty(len(likely))
+    for i, own in enumerate(map(slice, tracks.offsets[:-1], tracks.offsets[1:])):
+        points, spreads = (
+            np.vstack([means[i : i + 1], tracks.means[own]]),
+            np.vstack([covs[i : i + 1], tracks.covs[own]]),
+        )
+        factors = np.linalg.cholesky(spreads[1:, :2, :2]).swapaxes(1, 2)
+        nodes = points[1:, None, :2] + _NODES[:, : factors.shape[1]] @ factors
+        ratios = np.minimum(np.linalg.norm(nodes - points[:, None, None, :2], axis=-1) / cutoff, 1.0)
+        of_points = (ratios**order).mean(axis=-1) @ np.exp(tracks.log_weights[own])
+        best = int(np.argmin(of_points))
+        means[i], covs[i], errors[i] = points[best], spreads[best], of_points[best]
+    chosen = np.flatnonzero(2.0 * existence * (1.0 - errors) > 1.0)
+    return _peaks(gaussian_tracks(tracks.labels, means, covs, mean_class_probs(tracks)), chosen, existence[chosen])
 
 
 def best_estimate(density: Any, step: int) -> Estimate:

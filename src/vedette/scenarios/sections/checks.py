@@ -120,7 +120,7 @@ def _central(model: ScenarioModel) -> Iterator[Finding]:
 
 def _estimator(model: ScenarioModel) -> Iterator[Finding]:
     kind = model.estimates_by.kind
-    if model.filter.kind in UNLABELLED and kind in ("least_ospa", "marginal"):
+    if model.filter.kind in UNLABELLED and kind in ("least_ospa", "least_gospa", "marginal"):
         yield ("estimator", "kind"), f"map, as {model.filter.kind} filters have no labels", f'"{kind}"'
 
 

@@ -24,7 +24,14 @@ from vedette.scenarios.sections.network import NetworkSection
 from vedette.scenarios.sections.places import OriginSection, in_metres, misplaced_findings
 from vedette.scenarios.sections.planners import STRATEGIES, AnyPlanner
 from vedette.scenarios.sections.recording import RecordingSection
-from vedette.scenarios.sections.scoring import AnyEstimator, AnyMetric, LeastOspaEstimator, MapEstimator, Ospa
+from vedette.scenarios.sections.scoring import (
+    AnyEstimator,
+    AnyMetric,
+    LeastGospaEstimator,
+    LeastOspaEstimator,
+    MapEstimator,
+    Ospa,
+)
 from vedette.scenarios.sections.sensors import CLUTTER, Sensor, SensorDefaults
 from vedette.scenarios.sections.targets import Targets
 from vedette.scenarios.sections.tracking import AnyFilter, Filter
@@ -111,7 +118,8 @@ class ScenarioModel(Section):
     )
     estimator: AnyEstimator | None = Field(
         default=None,
-        description="How estimates are read off; none: least_ospa with a filter of kind factored_glmb, else map [-].",
+        description="How estimates are read off; none: with a filter of kind factored_glmb, least_gospa if "
+        "control.reward is expected_gospa, else least_ospa; with other filters map [-].",
     )
     control: Control = Field(default=Control(), description="When and how the sensors decide [-].")
     planners: dict[Name, AnyPlanner] = Field(
@@ -194,10 +202,14 @@ class ScenarioModel(Section):
 
     @property
     def estimates_by(self) -> Any:
-        """The estimator section in use, given or default."""
-        if self.estimator is not None:
-            return self.estimator
-        return LeastOspaEstimator() if self.filter.kind == "factored_glmb" else MapEstimator()
+        """The estimator section in use, given or default, with the cutoff and order of the score unless given."""
+        estimator: Any = self.estimator
+        if estimator is None:
+            by_gospa = self.control.reward.kind == "expected_gospa"
+            best = LeastGospaEstimator() if by_gospa else LeastOspaEstimator()
+            estimator = best if self.filter.kind == "factored_glmb" else MapEstimator()
+        missing = [name for name in ("cutoff", "order") if getattr(estimator, name, 0.0) is None]
+        return estimator.model_copy(update={name: getattr(self.ospa, name) for name in missing})
 
     @property
     def has_heights(self) -> bool:

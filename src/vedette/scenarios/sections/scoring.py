@@ -43,6 +43,24 @@ class LeastOspaEstimator(Section):
         return lambda density, step: least_ospa_estimate(density)
 
 
+class LeastGospaEstimator(Section):
+    """Every label whose report lowers the expected GOSPA of the positions (alpha = 2), at the point of least expected
+    error; for filters that have labels. The less certain the position, the more must existence exceed 0.5."""
+
+    kind: Literal["least_gospa"] = Field(default="least_gospa", description="Kind of estimate [-].")
+    cutoff: Positive | None = Field(
+        default=None, description="Error that counts as a missed and a false target, c; none: that of `ospa` [m]."
+    )
+    order: float | None = Field(default=None, ge=1.0, description="Order p; none: that of `ospa` [-].")
+
+    def build(self, folder: Path) -> Estimator:
+        """Return a function of a density and the number of its scan that returns the estimates."""
+        from vedette.densities import least_gospa_estimate
+
+        given = self.model_dump(exclude={"kind"}, exclude_none=True)
+        return lambda density, step: least_gospa_estimate(density, **given)
+
+
 class MarginalEstimator(Section):
     """Every label whose existence is probable enough; for filters that have labels."""
 
@@ -81,7 +99,7 @@ if TYPE_CHECKING:
 else:
     _ESTIMATOR = "vedette.densities:Estimator, a function of the density and the number of the scan"
     _METRIC = "vedette.simulation.records:Measure, a function of a run's record that gives one number a scan"
-    _OWN = (MapEstimator, LeastOspaEstimator, MarginalEstimator)
+    _OWN = (MapEstimator, LeastOspaEstimator, LeastGospaEstimator, MarginalEstimator)
     AnyEstimator = one_of("estimator", "densities", _ESTIMATOR, own=_OWN)
     AnyMetric = one_of("metric", "evaluation/metrics", _METRIC, own=(TrackedFraction, TimeToTrack))
 
