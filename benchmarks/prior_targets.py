@@ -13,7 +13,6 @@ from vedette.densities import existence_probabilities
 from vedette.models import BirthModel, TargetModel
 from vedette.simulation import CLUTTER, Scan, Truth
 from vedette.simulation.truth import moved_states
-from vedette.tracking.base import FIRST_PERIOD
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -24,7 +23,7 @@ class PriorTargets:
     """Targets drawn from a target model, so that an exact filter of this model is calibrated.
 
     At each scan a target survives and moves, with process noise, as the model says. Then each birth site gives birth
-    with its probability; the first scan counts as `FIRST_PERIOD` seconds, as in the trackers. The id of the target
+    with its probability; the first scan counts as one period of births, as in the trackers. The id of the target
     born at (step, site) is (step - 1) * num_sites + site.
     """
 
@@ -33,7 +32,7 @@ class PriorTargets:
     def truth(self, times: ArrayLike, *, rng: np.random.Generator) -> Truth:
         """Return the targets alive at each of (num_scans,) times in s."""
         scans, birth = np.asarray(times, np.float64), self.model.birth
-        periods = np.diff(scans, prepend=scans[0] - FIRST_PERIOD)
+        periods = np.diff(scans, prepend=scans[0] - (self.model.birth.period or 1.0))
         ids, states = np.empty(0, np.int64), np.empty((0, birth.state_dim))
         alive: list[Ints] = []
         rows: list[Floats] = []
