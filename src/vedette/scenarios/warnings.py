@@ -8,6 +8,7 @@ from itertools import combinations
 
 import numpy as np
 
+from vedette.internal.cut_births import MAX_CUT_SHARE, cut_share
 from vedette.kernels.base.types import Bools, Floats
 from vedette.scenarios.coastline import coastline_warnings
 from vedette.scenarios.coverage_warnings import coverage_warnings
@@ -15,9 +16,7 @@ from vedette.scenarios.diagnostics import Diagnostic, Path
 from vedette.scenarios.loading import Scenario, locate_fault, read_document
 from vedette.scenarios.sections import ScenarioModel
 from vedette.scenarios.sections.birth_labels import (
-    MAX_CUT_SHARE,
     birth_probability,
-    cut_share,
     has_one_belief,
     labels_until_detection,
     max_label_sets,
