@@ -221,7 +221,6 @@ def test_detection_is_its_mean_where_undetected_targets_are_an_intensity() -> No
         fusion = ("fusion: {kind: cm_delta_glmb, weights: [0.5, 0.5]}", "fusion: {kind: sequential}")
         changes = ("filter: {kind: m_delta_glmb}", f"filter: {{kind: {kind}}}"), fusion
         given = Scenario(parse_scenario(changed(*changes)), Path("f.yaml"))
-        assert given.model.filter.detection_taken_at == expected
         assert build_experiment(given).tracker.sensors[0].detection_at == expected
 
 

@@ -71,6 +71,7 @@ class _FactoredFilterBase(LabelledFilterBase[FactoredGLMB]):
 
     __slots__ = ()
     kind: ClassVar[type[FactoredGLMB]] = FactoredGLMB
+    default_detection_at: ClassVar[str] = "mean"
     limits: Limits
     max_split_error: float
     max_factor_labels: int

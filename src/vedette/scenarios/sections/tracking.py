@@ -60,12 +60,6 @@ class _Sensing(Section):
         "centre [-].",
     )
 
-    @property
-    def detection_taken_at(self) -> DetectionAt:
-        """Place at which the probability of detection is taken, given or default."""
-        usual: DetectionAt = "mean" if getattr(self, "kind", None) == "factored_glmb" else "centre"
-        return self.detection_at or usual
-
 
 @derived("vedette.filters.factored:FactoredGlmbFilter", only=("max_split_error", "max_factor_labels", "births"))
 class Filter(_Sensing, Derived):
