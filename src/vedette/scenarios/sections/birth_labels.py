@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
@@ -29,10 +28,10 @@ def max_label_sets(model: ScenarioModel) -> int | None:
     return int(section.limits.max_hypotheses)
 
 
-def birth_probability(model: ScenarioModel) -> float:
-    """Return the mean probability of a birth at a site within a step."""
+def birth_probabilities(model: ScenarioModel) -> Floats:
+    """Return the probability of a birth at each site within a step, shape (num_sites,)."""
     steps = model.time.step_period / (model.birth.period or model.time.step_period)
-    return float(np.mean([-math.expm1(steps * math.log1p(-site.existence)) for site in model.birth.sites]))
+    return -np.expm1(steps * np.log1p([-site.existence for site in model.birth.sites]))
 
 
 def birth_steps(model: ScenarioModel) -> int:
@@ -53,11 +52,11 @@ def has_one_belief(model: ScenarioModel) -> bool:
     return model.fusion.kind in SINGLE_BELIEF_FUSIONS
 
 
-def labels_until_detection(model: ScenarioModel, chances: Floats) -> float:
-    """Return the mean number of unconfirmed labels if a target of each site is detected with these probabilities."""
+def labels_until_detection(model: ScenarioModel, chances: Floats) -> Floats:
+    """Return the mean number of unconfirmed labels of each site if a scan detects its targets with these chances."""
     most = model.time.num_steps if model.birth.steps == "every" else len(model.birth.steps)
     steps = birth_steps(model) / np.maximum(chances, 1e-9)
-    return float(np.minimum(steps, most).sum())
+    return np.minimum(steps, most)
 
 
 def births_cut(model: ScenarioModel) -> Iterator[Finding]:
@@ -66,7 +65,7 @@ def births_cut(model: ScenarioModel) -> Iterator[Finding]:
     if most is None:
         return
     steps, sites = birth_steps(model), len(model.birth.sites)
-    share = cut_share(steps * sites, birth_probability(model), most)
+    share = cut_share(steps * sites, float(birth_probabilities(model).mean()), most)
     if share > MAX_CUT_SHARE:
         wanted = (
             f"factored_glmb or lmb (or births at fewer birth.steps, or a longer time.step_period), as {steps} steps "

@@ -111,7 +111,8 @@ class ScenarioModel(Section):
     )
     estimator: AnyEstimator | None = Field(
         default=None,
-        description="How estimates are read off; none: least_ospa with a filter of kind factored_glmb, else map [-].",
+        description="How estimates are read off; none: least_ospa with a filter of kind factored_glmb, or lmb with "
+        "births: poisson, else map [-].",
     )
     control: Control = Field(default=Control(), description="When and how the sensors decide [-].")
     planners: dict[Name, AnyPlanner] = Field(
@@ -197,7 +198,7 @@ class ScenarioModel(Section):
         """The estimator section in use, given or default."""
         if self.estimator is not None:
             return self.estimator
-        return LeastOspaEstimator() if self.filter.kind == "factored_glmb" else MapEstimator()
+        return LeastOspaEstimator() if self.filter.built_kind == "factored_glmb" else MapEstimator()
 
     @property
     def has_heights(self) -> bool:
