@@ -30,7 +30,7 @@ class SlowRewardWarning(UserWarning):
 
 
 class ImplausibleWarning(UserWarning):
-    """A valid argument that is probably a mistake: another unit, or exchanged numbers."""
+    """A valid argument that is probably a mistake: another unit, exchanged numbers, or a limit that cuts births."""
 
 
 class ScenarioError(VedetteError):

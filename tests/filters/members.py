@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -40,7 +41,13 @@ CENTRAL: dict[Any, Any] = {
     SequentialLmbFilter: LMB,
     SequentialFactoredFilter: FactoredGLMB,
 }
-LABELLED: dict[Any, Any] = {DeltaGlmbFilter: GLMB, LmbFilter: LMB, FactoredGlmbFilter: FactoredGLMB}
+PMB: Any = partial(FactoredGlmbFilter, max_split_error=2.0)  # in scenarios an lmb with births: poisson
+LABELLED: dict[Any, Any] = {
+    DeltaGlmbFilter: GLMB,
+    LmbFilter: LMB,
+    FactoredGlmbFilter: FactoredGLMB,
+    PMB: FactoredGLMB,
+}
 UNLABELLED: dict[Any, Any] = {PhdFilter: Poisson, CphdFilter: IidCluster, CbMemberFilter: MultiBernoulli}
 BELIEFS = LABELLED | UNLABELLED | CENTRAL  # what each believes in
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from pathlib import Path
 from typing import Any
 
@@ -11,10 +12,10 @@ import pytest
 from scenarios.minimal import changed
 from vedette import models
 from vedette.densities import existence_probabilities
-from vedette.errors import ScenarioError
-from vedette.filters import DeltaGlmbFilter
+from vedette.errors import ImplausibleWarning, ScenarioError
+from vedette.filters import DeltaGlmbFilter, MultiSensorGlmbFilter
+from vedette.internal.cut_births import MAX_CUT_SHARE, cut_share
 from vedette.scenarios import load_scenario, parse_scenario
-from vedette.scenarios.sections.birth_labels import cut_share
 from vedette.scenarios.warnings import scenario_warnings
 
 REGION = models.Region(-5e3, 5e3, -5e3, 5e3)
@@ -33,21 +34,28 @@ FAR = (
 )
 
 
-def predicted(existence: float, dt: float, steps: int, sites: int, marginalised: bool) -> float:
-    """Expected number of targets after as many predictions without a scan, with births of a period of 1 s."""
+def models_of(
+    existence: float, sites: int, period: float | None = 1.0
+) -> tuple[models.TargetModel, models.SensorModel]:
+    """Targets born at sites within a period, and a sensor of positions."""
     means = np.array([[100.0 * i, 0.0, 0.0, 0.0] for i in range(sites)])
     covs = np.tile(np.diag([100.0, 100.0, 9.0, 9.0]), (sites, 1, 1))
-    birth = models.BirthModel(np.full(sites, existence), means, covs, period=1.0)
+    birth = models.BirthModel(np.full(sites, existence), means, covs, period=period)
     targets = models.TargetModel(models.constant_velocity(1.0), models.constant_survival(1.0), birth)
     noise, clutter = models.constant_noise([10.0, 10.0]), models.region_clutter(5.0, REGION, "position")
-    sensor = models.SensorModel(models.position(), noise, models.constant_detection(0.9), clutter)
-    local = DeltaGlmbFilter(targets, sensor, marginalised=marginalised)
+    return targets, models.SensorModel(models.position(), noise, models.constant_detection(0.9), clutter)
+
+
+def predicted(existence: float, dt: float, steps: int, sites: int, marginalised: bool) -> float:
+    """Expected number of targets after as many predictions without a scan, with births of a period of 1 s."""
+    local = DeltaGlmbFilter(*models_of(existence, sites), marginalised=marginalised)
     belief: Any = local.initial()
     for step in range(1, steps + 1):
         belief, _ = local.predict(belief, dt, step)
     return float(existence_probabilities(belief)[1].sum())
 
 
+@pytest.mark.filterwarnings("ignore:max_hypotheses:vedette.errors.ImplausibleWarning")
 @pytest.mark.parametrize("marginalised", [False, True])
 @pytest.mark.parametrize(
     ("existence", "dt", "steps", "sites"),
@@ -59,6 +67,50 @@ def test_warning_states_the_fraction_of_hypotheses_the_filter_truncates(
     each = 1.0 - (1.0 - existence) ** dt
     left = predicted(existence, dt, steps, sites, marginalised) / (steps * sites * each)
     assert cut_share(steps * sites, each, 300) == pytest.approx(1.0 - left, abs=2e-3)
+
+
+def first_warned(local: Any, dt: float, steps: int, every: int) -> int | None:
+    """First step at which a filter warns, if there is a scan of one target at every so many steps."""
+    belief, rng, several = local.initial(), np.random.default_rng(0), isinstance(local, MultiSensorGlmbFilter)
+    for step in range(1, steps + 1):
+        scan = np.zeros((1, 2)) if step % every == 0 else None
+        with warnings.catch_warnings(record=True) as found:
+            warnings.simplefilter("always")
+            if several:
+                belief, _ = local.step(belief, [scan], np.zeros((1, 3)), dt, step, rng=rng)
+            elif scan is None:
+                belief, _ = local.predict(belief, dt, step)
+            else:
+                belief, _ = local.step(belief, scan, np.zeros(3), dt, step, rng=rng)
+        if found:
+            (warning,) = found
+            assert warning.category is ImplausibleWarning
+            assert warning.filename == __file__
+            assert "300 hypotheses cut more than 5 % of the expected births" in str(warning.message)
+            return step
+    return None
+
+
+@pytest.mark.parametrize("several", [False, True])
+@pytest.mark.parametrize(
+    ("existence", "dt", "steps", "every"), [(0.2, 0.05, 60, 60), (0.2, 0.05, 60, 6), (0.1, 1.0, 5, 6)]
+)
+def test_a_filter_in_python_warns_where_a_scenario_is_refused(
+    several: bool, existence: float, dt: float, steps: int, every: int
+) -> None:
+    """At the first step at which the unconfirmed labels of one site are as many as the check refuses."""
+    targets, sensor = models_of(existence, 1)
+    local = MultiSensorGlmbFilter(targets, [sensor]) if several else DeltaGlmbFilter(targets, sensor)
+    each = 1.0 - (1.0 - existence) ** dt
+    refused = [n for n in range(1, every + 1) if cut_share(n, each, 300) > MAX_CUT_SHARE]
+    expected = refused[0] if refused and refused[0] <= steps else None
+    assert first_warned(local, dt, steps, every) == expected
+    assert (expected is None) == (every != 60)
+
+
+def test_births_per_step_never_warn() -> None:
+    """Without a period births are meant per step, and a scenario is not refused."""
+    assert first_warned(DeltaGlmbFilter(*models_of(0.01, 1, period=None)), 0.05, 40, 40) is None
 
 
 def test_few_labels_or_many_hypotheses_truncate_nothing() -> None:

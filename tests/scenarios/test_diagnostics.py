@@ -324,7 +324,7 @@ last_scan: 20} -> last_scan: 20}\nundetected: {cell_size: 9.0, expected: 1.0, sp
 last_scan: 20} -> last_scan: 20}\nundetected: {cell_size: 0.1, expected: 1.0, speed: 1.0}
     24:25: undetected.cell_size: expected at least 0.285, as at most 250,000 cells may fill the region, got 0.1
 last_scan: 20} -> last_scan: 20}\nundetected: {cell_size: 9.0, expected: 1.0, speed: 1.0, birth_rate: learnt}
-    24:69: undetected.birth_rate: expected a number, as only one belief of all scans by filter.kind factored_glmb with births: poisson learns it, got "learnt"
+    24:69: undetected.birth_rate: expected a number, as only one belief of all scans by filter.kind factored_glmb or lmb with births: poisson learns it, got "learnt"
 last_scan: 20} -> last_scan: 20}\nundetected: {cell_size: 9.0, expected: 1.0, speed: 1.0, birth_rate: known}
     24:69: undetected.birth_rate: expected a number or learnt, got "known"
 last_scan: 20} -> last_scan: 20}\nundetected: {cell_size: 9.0, expected: 1.0, speed: 1.0, prior_rate: 0.1}

@@ -112,7 +112,7 @@ def noise_stds(scenario: Scenario, placed: list[int]) -> dict[int, Floats]:
     model = scenario.model
     region, method, stds = model.region.build(), model.filter.gaussian_method, {}
     for s in placed:
-        local = model.sensors[s].build(region, method, scenario.folder, model.filter.detection_taken_at)
+        local = model.sensors[s].build(region, method, scenario.folder)
         stds[s] = np.zeros(2) if local.noise.least_stds is None else np.asarray(local.noise.least_stds)[:2]
     return stds
 

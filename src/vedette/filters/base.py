@@ -35,6 +35,7 @@ from vedette.models import (
     position,
 )
 from vedette.models.arguments import generator, pose_vector, positive, step_number
+from vedette.models.sensor import with_default_detection_at
 
 BeliefT = TypeVar("BeliefT", bound=LabelledDensity)
 
@@ -76,6 +77,7 @@ class WithBirths(SummaryRepr):
     """A filter whose labels may begin at birth sites."""
 
     __slots__ = ()
+    default_detection_at: ClassVar[str] = "centre"  # of sensors whose `detection_at` is None
     targets: TargetModel
     limits: Limits
 
@@ -110,6 +112,7 @@ class SingleSensorFilter(WithBirths):
             value = getattr(self, name)
             if not isinstance(value, kind):
                 raise InputError(f"{name}: expected a {kind.__name__}; got {type(value).__name__}")
+        object.__setattr__(self, "sensor", with_default_detection_at(self.sensor, self.default_detection_at))
 
     def _inputs_after(
         self,

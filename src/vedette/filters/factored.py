@@ -71,6 +71,7 @@ class _FactoredFilterBase(LabelledFilterBase[FactoredGLMB]):
 
     __slots__ = ()
     kind: ClassVar[type[FactoredGLMB]] = FactoredGLMB
+    default_detection_at: ClassVar[str] = "mean"
     limits: Limits
     max_split_error: float
     max_factor_labels: int
@@ -183,9 +184,9 @@ class FactoredGlmbFilter(_FactoredFilterBase, LabelledFilter[FactoredGLMB]):
     independent within `max_split_error`. A list of `limits.max_hypotheses` therefore serves a few interacting targets,
     not all of them: the accuracy for a distant target does not depend on the length of the list, and the cost grows
     with the number of targets, not with the number of their combinations. With a `max_split_error` of 2 every label is
-    its own factor, as in an LMB filter; with 0, and `max_factor_labels` at least the number of targets, no dependent
-    factors are split, as in a delta-GLMB filter. The filter draws no random numbers. Its predictions are truncated as
-    those of a delta-GLMB filter, factor by factor, but drop no label.
+    its own factor, as in an LMB filter (with Poisson births, a PMB filter); with 0, and `max_factor_labels` at least
+    the number of targets, no dependent factors are split, as in a delta-GLMB filter. The filter draws no random
+    numbers. Its predictions are truncated as those of a delta-GLMB filter, factor by factor, but drop no label.
 
     Attributes:
         targets: motion, survival and birth models.

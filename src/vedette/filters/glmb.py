@@ -3,20 +3,23 @@
 from __future__ import annotations
 
 import math
+import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 
-from vedette.densities import GLMB
+from vedette.densities import GLMB, LMB, existence_probabilities
 from vedette.densities.tracks import UNSCANNED
-from vedette.errors import InputError, NumericalError
+from vedette.errors import ImplausibleWarning, InputError, NumericalError
 from vedette.filters.assignment import Gibbs, JointAssociation, RankedAssignment
 from vedette.filters.base import LabelledFilter, LabelledFilterBase, SensorStep, blind_sensor
 from vedette.filters.limits import Limits
 from vedette.filters.multi_sensor import SequentialUpdate
 from vedette.filters.protocols import FilterInfo
+from vedette.internal.cut_births import MAX_CUT_SHARE, cut_share
+from vedette.internal.probabilities import expit
 from vedette.kernels.base.types import Glmb, Ints
 from vedette.kernels.labelled.conversions import marginalise
 from vedette.kernels.steps.glmb import StepReport, step_gibbs, step_ranked
@@ -30,6 +33,19 @@ class _GlmbFilterBase(LabelledFilterBase[GLMB]):
     kind: ClassVar[type[GLMB]] = GLMB
     limits: Limits
     marginalised: bool
+
+    def _before_scan(self, prior: GLMB, dt: float, step: Any, births: LMB | None) -> Any:
+        if dt > 0.0 and self.targets.birth.period is not None:
+            born = expit(self._births(dt, step, None, births).existence_logit)
+            existence, most = existence_probabilities(prior)[1], self.limits.max_hypotheses
+            # Labels of at most twice the probability of a birth are taken as unconfirmed.
+            labels = np.concatenate([born, existence[existence <= 2.0 * born.max(initial=0.0)]])
+            if cut_share(len(labels), float(labels.sum()) / max(len(labels), 1), most) > MAX_CUT_SHARE:
+                text = f"max_hypotheses: {most} hypotheses cut more than {100.0 * MAX_CUT_SHARE:g} % of the expected "
+                text += "births, as each site makes a label at each step until a scan confirms or rejects them; use "
+                text += "FactoredGlmbFilter or LmbFilter, longer steps without scans, or births at fewer steps"
+                warnings.warn(text, ImplausibleWarning, stacklevel=3)
+        return prior.to_kernel()
 
     def _run_kernel(self, prior: Glmb, step: SensorStep) -> tuple[Glmb, StepReport]:
         return step_ranked(prior, *step.inputs)

@@ -18,6 +18,7 @@ from vedette.filters.protocols import FilterInfo
 from vedette.kernels.base.types import Bools, Floats, Ints, Lmb, Motion, ScanInput
 from vedette.models import SensorModel, TargetModel, kernel_motion
 from vedette.models.arguments import generator, one_a_sensor, pose_vector, positive, reject, step_number
+from vedette.models.sensor import with_default_detection_at
 
 
 class SensorScans(NamedTuple):
@@ -73,7 +74,8 @@ class MultiSensorFilter(LabelledFilterBase[BeliefT]):
         for s, sensor in enumerate(self.sensors):
             if not isinstance(sensor, SensorModel):
                 raise InputError(f"sensors[{s}]: expected a SensorModel; got {type(sensor).__name__}")
-        object.__setattr__(self, "sensors", tuple(self.sensors))
+        at = self.default_detection_at
+        object.__setattr__(self, "sensors", tuple(with_default_detection_at(sensor, at) for sensor in self.sensors))
 
     def step(
         self,

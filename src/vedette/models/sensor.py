@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import lru_cache
 
 import numpy as np
@@ -55,7 +55,8 @@ class SensorModel:
         detection_at: filters evaluate the probability of detection at the "centre" of a predicted Gaussian, as in the
             paper, or as its "mean" over the Gaussian, with nodes over the position. With the mean, if P_D varies over
             the Gaussian, a miss moves the density to places of low P_D, and a detection has the mean P_D of the
-            density after it.
+            density after it. None: the mean in filters of a factored GLMB, else the centre; the `sensor` of a filter
+            has the value in use.
         meas_dim: number of components of a measurement.
 
     Raises:
@@ -68,7 +69,7 @@ class SensorModel:
     detection: DetectionModel
     clutter: ClutterModel
     method: str = "auto"
-    detection_at: str = "centre"
+    detection_at: str | None = None
     meas_dim: int = field(init=False)
 
     def __post_init__(self) -> None:
@@ -85,7 +86,8 @@ class SensorModel:
             expected = f"a model for measurements whose angular flags are {self.measurement.angular.tolist()}"
             raise reject("SensorModel.clutter", expected, angular.tolist())
         resolve_method("SensorModel.method", self.method, self.measurement.jacobian is not None)
-        one_of("SensorModel.detection_at", self.detection_at, ("centre", "mean"))
+        if self.detection_at is not None:
+            one_of("SensorModel.detection_at", self.detection_at, ("centre", "mean"))
         self._check_bearings()
 
     def _check_bearings(self) -> None:
@@ -106,7 +108,7 @@ class SensorModel:
 
         detection_at: replaces the sensor's own; "mean" then uses the model's `mean_function`, if it has one.
         """
-        if self.detection.is_constant or (detection_at or self.detection_at) == "centre":
+        if self.detection.is_constant or (detection_at or self.detection_at or "centre") == "centre":
             return _bundle_of(self, AT_CENTRE)
         if detection_at is None:
             return _bundle_of(self, AT_EDGES)
@@ -144,6 +146,12 @@ class SensorModel:
         self.detection.check(table, at)
         measured = self.measurement.measure(table, at)
         self.clutter.check(measured, at, self.measurement, state_dim=table.shape[1])
+
+
+@lru_cache(maxsize=1000)
+def with_default_detection_at(model: SensorModel, default: str) -> SensorModel:
+    """Return the model with this `detection_at` if it has none; the same object for equal arguments."""
+    return model if model.detection_at is not None else replace(model, detection_at=default)
 
 
 @lru_cache(maxsize=1000)

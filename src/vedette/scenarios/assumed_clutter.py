@@ -157,7 +157,7 @@ def _rate(model: ScenarioModel, recording: RecordedScans, s: int, folder: FilePa
 def _placed_scans(model: ScenarioModel, recording: RecordedScans, s: int, folder: FilePath) -> list[PlacedScan]:
     """Return the scans of a sensor as places; none if it measures no places or its noise is unknown."""
     section = model.sensors[s]
-    sensor = section.build(model.region.build(), model.filter.gaussian_method, folder, model.filter.detection_taken_at)
+    sensor = section.build(model.region.build(), model.filter.gaussian_method, folder)
     kind, stds, placed = section.measurement.kind, sensor.noise.least_stds, list[PlacedScan]()
     if kind not in PLACED or stds is None:
         return placed

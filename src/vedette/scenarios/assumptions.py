@@ -111,7 +111,7 @@ def _place_std(model: ScenarioModel, measured: Sequence[Sequence[Floats]], folde
     region, method = model.region.build(), model.filter.gaussian_method
     stds_of_sensors = list[Floats]()
     for section, scans in zip(model.sensors, measured, strict=True):
-        stds = section.build(region, method, folder, model.filter.detection_taken_at).noise.least_stds
+        stds = section.build(region, method, folder).noise.least_stds
         if stds is None or not scans:
             continue
         kind, scan = section.measurement.kind, np.concatenate(scans)

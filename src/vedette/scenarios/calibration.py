@@ -67,9 +67,8 @@ def build_problem(scenario: Scenario, *, position: bool = False, bearings: Beari
             clockwise = recording.bearings[s] == "north"
             parameters += _bias_parameters(s, sensor, sites[s].bias, clockwise, position, only_positions)
             parameters += _model_parameters(s, sensor)
-    targets = _births_per_scan(
-        common_target_model([sensor.filter for sensor in build_sensors(scenario)]), recording.times
-    )
+    filters = [sensor.filter for sensor in build_sensors(scenario)]
+    targets = _births_per_scan(common_target_model(filters), recording.times)
     region, method = model.region.build(), model.filter.gaussian_method
 
     wide_region = _widen_region(region)
@@ -84,7 +83,7 @@ def build_problem(scenario: Scenario, *, position: bool = False, bearings: Beari
                 added_rates[s] = changes.get("rate", 0.0) - sensor.clutter.rate if changes else 0.0
                 sensor = sensor.model_copy(update={"clutter": sensor.clutter.model_copy(update=changes)})
                 built = sensor.build(
-                    area, _smooth(method, sensor.measurement.kind), folder, model.filter.detection_taken_at
+                    area, _smooth(method, sensor.measurement.kind), folder, filters[s].sensor.detection_at
                 )
                 if sensor.clutter.kind in _SUPPORTED_CLUTTER:
                     raw = at_raw_measurements(built.clutter, *sensor_bias(biased[s], recording.bearings[s]))

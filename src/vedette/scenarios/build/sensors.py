@@ -46,7 +46,7 @@ def build_sensors(scenario: Scenario) -> tuple[MobileSensor, ...]:
     )
     sensors = []
     for sensor in model.sensors:
-        assumed = sensor.build(region, method, folder, model.filter.detection_taken_at)
+        assumed = sensor.build(region, method, folder, model.filter.detection_at)
         local = model.filter.build(targets, assumed, folder)
         _check_custom_parts(scenario, sensor, assumed, local)
         sensors.append(MobileSensor(local, _platform(model, sensor, folder), _scan_times(model, sensor)))

@@ -1,18 +1,13 @@
-"""Labels of births that no scan has confirmed yet, and the share of births that a cap on hypotheses cuts.
-
-A delta-GLMB makes a label for each birth site at each step. Until a scan confirms or rejects them, every set of these
-labels is a hypothesis. `birth.period` keeps the expected number of births the same for steps of any length, but shorter
-steps make more labels, and the cap on hypotheses cuts their larger sets.
-"""
+"""Labels of births in a scenario that no scan has confirmed yet; see `vedette.internal.cut_births`."""
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from vedette.internal.cut_births import MAX_CUT_SHARE, cut_share
 from vedette.scenarios.diagnostics import Finding, describe
 from vedette.scenarios.sections.fusion import SINGLE_BELIEF_FUSIONS
 
@@ -20,36 +15,7 @@ if TYPE_CHECKING:
     from vedette.kernels.base.types import Floats
     from vedette.scenarios.sections.scenario import ScenarioModel
 
-# Share of the expected births above which a scenario is refused, or causes a warning.
-MAX_CUT_SHARE = 0.05
 CAPPED = ("delta_glmb", "m_delta_glmb")
-
-
-def cut_share(num_labels: float, probability: float, max_sets: int) -> float:
-    """Return the share of the expected births that is cut if the `max_sets` heaviest sets of labels are retained.
-
-    For n labels of probability q each, the sets of k labels have the probability q^k (1 - q)^(n - k). Small sets are
-    the heaviest, and the retained ones are normalised.
-
-    Args:
-        num_labels: number of unconfirmed labels, at least 0.
-        probability: of each, in (0, 0.5); for larger ones the result is 0.
-        max_sets: number of hypotheses retained.
-    """
-    n, expected = math.floor(num_labels), math.floor(num_labels) * probability
-    if n == 0 or probability >= 0.5:
-        return 0.0
-    remaining, total, births = float(max_sets), 0.0, 0.0
-    for k in range(min(n, math.ceil(expected + 10.0 * math.sqrt(expected) + 20.0)) + 1):
-        log_sets = math.lgamma(n + 1) - math.lgamma(k + 1) - math.lgamma(n - k + 1)
-        num_sets = min(math.exp(min(log_sets, 700.0)), remaining)
-        weight = num_sets * math.exp(
-            k * math.log(probability / (1.0 - probability))
-        )  # relative to the set without births
-        remaining, total, births = remaining - num_sets, total + weight, births + k * weight
-        if remaining <= 0.5:
-            break
-    return max(0.0, 1.0 - births / total / expected)
 
 
 def max_label_sets(model: ScenarioModel) -> int | None:
@@ -62,10 +28,10 @@ def max_label_sets(model: ScenarioModel) -> int | None:
     return int(section.limits.max_hypotheses)
 
 
-def birth_probability(model: ScenarioModel) -> float:
-    """Return the mean probability of a birth at a site within a step."""
+def birth_probabilities(model: ScenarioModel) -> Floats:
+    """Return the probability of a birth at each site within a step, shape (num_sites,)."""
     steps = model.time.step_period / (model.birth.period or model.time.step_period)
-    return float(np.mean([-math.expm1(steps * math.log1p(-site.existence)) for site in model.birth.sites]))
+    return -np.expm1(steps * np.log1p([-site.existence for site in model.birth.sites]))
 
 
 def birth_steps(model: ScenarioModel) -> int:
@@ -86,11 +52,11 @@ def has_one_belief(model: ScenarioModel) -> bool:
     return model.fusion.kind in SINGLE_BELIEF_FUSIONS
 
 
-def labels_until_detection(model: ScenarioModel, chances: Floats) -> float:
-    """Return the mean number of unconfirmed labels if a target of each site is detected with these probabilities."""
+def labels_until_detection(model: ScenarioModel, chances: Floats) -> Floats:
+    """Return the mean number of unconfirmed labels of each site if a scan detects its targets with these chances."""
     most = model.time.num_steps if model.birth.steps == "every" else len(model.birth.steps)
     steps = birth_steps(model) / np.maximum(chances, 1e-9)
-    return float(np.minimum(steps, most).sum())
+    return np.minimum(steps, most)
 
 
 def births_cut(model: ScenarioModel) -> Iterator[Finding]:
@@ -99,7 +65,7 @@ def births_cut(model: ScenarioModel) -> Iterator[Finding]:
     if most is None:
         return
     steps, sites = birth_steps(model), len(model.birth.sites)
-    share = cut_share(steps * sites, birth_probability(model), most)
+    share = cut_share(steps * sites, float(birth_probabilities(model).mean()), most)
     if share > MAX_CUT_SHARE:
         wanted = (
             f"factored_glmb or lmb (or births at fewer birth.steps, or a longer time.step_period), as {steps} steps "

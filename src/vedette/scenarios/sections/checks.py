@@ -88,7 +88,7 @@ def _fusion_of_several(model: ScenarioModel) -> Iterator[Finding]:
 
 
 def _fusion_of_kind(model: ScenarioModel) -> Iterator[Finding]:
-    kind, filters = model.fusion.kind, model.filter.kind
+    kind, filters = model.fusion.kind, model.filter.built_kind
     if kind == "cm_delta_glmb" and filters == "lmb":
         wanted = "sequential, parallel, clmb, arithmetic_average, central or none, as the filters are lmb"
         yield ("fusion", "kind"), wanted, describe(kind)

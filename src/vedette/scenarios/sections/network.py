@@ -49,8 +49,10 @@ def network_of_fusion(model: ScenarioModel) -> Iterator[Finding]:
     if fusion.kind in SCAN_FUSIONS and network.consensus_rounds is not None:
         wanted = f"none, as under {fusion.kind} sensors send scans, of which there is no average"
         yield ("network", "consensus_rounds"), wanted, describe(network.consensus_rounds)
-    if fusion.kind == "parallel" and model.filter.kind == "factored_glmb":
-        wanted = "lmb, as over a network parallel adds what a scan said to another prediction, label by label"
+    if fusion.kind == "parallel" and model.filter.built_kind == "factored_glmb":
+        wanted = (
+            "lmb with births: labelled, as over a network parallel adds each label's evidence to another prediction"
+        )
         yield ("filter", "kind"), wanted, describe(model.filter.kind)
     if fusion.kind == "parallel" and network.delay > 0:
         yield ("network", "delay"), "0, as parallel divides by the prediction of the same time", describe(network.delay)

@@ -118,8 +118,8 @@ class ScenarioModel(Section):
     )
     estimator: AnyEstimator | None = Field(
         default=None,
-        description="How estimates are read off; none: with a filter of kind factored_glmb, least_gospa if "
-        "control.reward is expected_gospa, else least_ospa; with other filters map [-].",
+        description="How estimates are read off; none: with a filter of kind factored_glmb, or lmb with births: poisson, "
+        "least_gospa if control.reward is expected_gospa, else least_ospa; with other filters map [-].",
     )
     control: Control = Field(default=Control(), description="When and how the sensors decide [-].")
     planners: dict[Name, AnyPlanner] = Field(
@@ -207,7 +207,7 @@ class ScenarioModel(Section):
         if estimator is None:
             by_gospa = self.control.reward.kind == "expected_gospa"
             best = LeastGospaEstimator() if by_gospa else LeastOspaEstimator()
-            estimator = best if self.filter.kind == "factored_glmb" else MapEstimator()
+            estimator = best if self.filter.built_kind == "factored_glmb" else MapEstimator()
         missing = [name for name in ("cutoff", "order") if getattr(estimator, name, 0.0) is None]
         return estimator.model_copy(update={name: getattr(self.ospa, name) for name in missing})
 

@@ -15,7 +15,6 @@ from vedette.internal.unit_warnings import suppress_unit_warnings
 from vedette.kernels.base.types import BEAM, OWN_HEIGHT
 from vedette.scenarios.diagnostics import Finding, describe
 from vedette.scenarios.sections.base import (
-    DetectionAt,
     GaussianMethod,
     Name,
     Point,
@@ -306,7 +305,7 @@ class Sensor(Section):
         return (*self.pose[:BEAM], 0.0, self.turn.build().rate, *self.pose[OWN_HEIGHT:])
 
     def build(
-        self, region: Region, method: GaussianMethod, folder: Path, detection_at: DetectionAt = "centre"
+        self, region: Region, method: GaussianMethod, folder: Path, detection_at: str | None = None
     ) -> SensorModel:
         """Return the model of the sensor in the filters; the file of a custom model is relative to `folder`.
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, ClassVar, Literal, get_args
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, get_args
 
 from pydantic import Field
 
@@ -56,15 +56,15 @@ class _Sensing(Section):
     detection_at: DetectionAt | None = Field(
         default=None,
         description="Of a predicted Gaussian, the probability of detection at its centre, as in the paper, or its mean "
-        "over the Gaussian, where a miss also moves the density out of view; none: mean with kind factored_glmb, else "
-        "centre [-].",
+        "over the Gaussian, where a miss also moves the density out of view; none: mean with kind factored_glmb, or "
+        "lmb with births: poisson, else centre [-].",
     )
 
     @property
-    def detection_taken_at(self) -> DetectionAt:
-        """Place at which the probability of detection is taken, given or default."""
-        usual: DetectionAt = "mean" if getattr(self, "kind", None) == "factored_glmb" else "centre"
-        return self.detection_at or usual
+    def built_kind(self) -> str:
+        """Kind of the filter that is built: an lmb with Poisson births is a factored_glmb of independent labels."""
+        kind: str = getattr(self, "kind", "")
+        return "factored_glmb" if kind == "lmb" and getattr(self, "births", None) == "poisson" else kind
 
 
 @derived("vedette.filters.factored:FactoredGlmbFilter", only=("max_split_error", "max_factor_labels", "births"))
@@ -78,12 +78,20 @@ class Filter(_Sensing, Derived):
         "and for a single sensor that nobody steers by its density: PHD, CPHD, cardinality-balanced multi-Bernoulli "
         "[-].",
     )
+    births: Literal["poisson", "labelled"] | None = Field(
+        default=None,
+        description="Of a factored_glmb or lmb: poisson: targets that were never detected are a Poisson intensity, and "
+        "a label begins with a first detection, except at sites with an existence of .15 or more; so a site may have "
+        "several undetected targets. An lmb is then a factored_glmb with a max_split_error of 2 (a PMB). labelled: a "
+        "label begins at each birth site at each scan. none: labelled with kind lmb, else poisson. Filters whose "
+        "beliefs are fused by label have labelled births, whatever this value is [-].",
+    )
     assignment: Assignment = Field(default=of_kind("ranked"), description="How measurements are associated [-].")
     limits: FilterLimits = Field(default=FilterLimits(), description="What is thrown away [-].")
 
     @check
     def _assignment_fits(self) -> Iterator[Finding]:
-        required = _REQUIRED_RESULTS.get(self.kind, "choices and marginals")
+        required = _REQUIRED_RESULTS.get(self.built_kind, "choices and marginals")
         fitting = [
             section.model_fields["kind"].default
             for section in get_args(get_args(Assignment)[0])
@@ -92,9 +100,15 @@ class Filter(_Sensing, Derived):
         if self.assignment.kind not in fitting:
             yield (
                 ("assignment", "kind"),
-                f"{' or '.join(fitting)}, as the filter is {self.kind}",
+                f"{' or '.join(fitting)}, as the filter is {self.kind}"
+                f"{' with births: poisson' * (self.built_kind != self.kind)}",
                 describe(self.assignment.kind),
             )
+
+    def to_arguments(self) -> dict[str, Any]:
+        """Return the arguments of a `FactoredGlmbFilter`."""
+        split = {"max_split_error": 2.0} if self.kind == "lmb" else {}
+        return {**super().to_arguments(), "births": self.births or "poisson", **split}
 
     def build(self, targets: TargetModel, sensor: SensorModel, folder: Path) -> LocalFilter:
         """Return the filter of one sensor."""
@@ -108,7 +122,7 @@ class Filter(_Sensing, Derived):
         )
 
         limits, assignment = self.limits.build(), self.assignment.build(folder)
-        match self.kind:
+        match self.built_kind:
             case "lmb":
                 return LmbFilter(targets, sensor, limits, assignment)
             case "factored_glmb":
@@ -133,7 +147,7 @@ class Filter(_Sensing, Derived):
         )
 
         limits = self.limits.build()
-        if self.kind == "factored_glmb":
+        if self.built_kind == "factored_glmb":
             return SequentialFactoredFilter(targets, sensors, limits, **self.to_arguments())
         if self.kind == "lmb":
             if in_turn:

@@ -129,7 +129,9 @@ def learnt_births(model: ScenarioModel) -> Iterator[Finding]:
     measured, section = model.birth.from_measurements, model.undetected
     if _has_intensity(model):
         return
-    wanted = "a number, as only one belief of all scans by filter.kind factored_glmb with births: poisson learns it"
+    wanted = (
+        "a number, as only one belief of all scans by filter.kind factored_glmb or lmb with births: poisson learns it"
+    )
     if measured is not None and measured.expected == "learnt":
         yield ("birth", "from_measurements", "expected"), wanted, describe(measured.expected)
     if section is not None and section.birth_rate == "learnt":
@@ -145,7 +147,7 @@ def _has_intensity(model: ScenarioModel) -> bool:
         or getattr(fusion, "filter", None) is not None
     ):
         return False
-    return isinstance(filters, Filter) and filters.kind == "factored_glmb" and filters.births == "poisson"
+    return isinstance(filters, Filter) and filters.built_kind == "factored_glmb" and filters.births != "labelled"
 
 
 def cells_of_undetected(model: ScenarioModel) -> Iterator[Finding]:
