@@ -196,7 +196,8 @@ class LiveScreen:
             health.note_filters(index, instant.info.filters)
             health.note_fusion(index, instant.info.fusion)
         results = run_diagnostics(health, self._names)
-        if len(latest) == len(self._labels) == _HEALTH_OF:
+        if len(self._labels) == _HEALTH_OF:
+            health.dropped_existence[:] *= _HEALTH_OF / len(latest)
             of_targets = new_target_diagnostics(self._new_targets, health, len(set().union(*self._labels)))
             results += tuple(each for each in of_targets if each.level == "check")
         return diagnostics_line(results)
