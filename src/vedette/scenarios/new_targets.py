@@ -25,6 +25,7 @@ if TYPE_CHECKING:  # importing the models is slow
 
 MOST_LATE = 0.5  # share of the births
 _POINTS_PER_SIDE, _MAX_DETECTIONS = 5, 300
+_SETTLED = 30  # detections of each sensor after which the covariance hardly changes
 _ERROR = 2.0  # detections; of runs with 1e-6 to 1 births per scan
 _MIN_DETECTION = 0.1  # a place is covered if a sensor has this probability of detection there
 _WIDE = 3.0  # factor of the position std of a birth anywhere before its first detection, as in the filter
@@ -201,8 +202,11 @@ def _needed(model: ScenarioModel, motion: MotionModel, source: _Source, views: S
             odds += math.log(chance) - log_false - (0.0 if source.area else 0.5 * dim)
         else:  # a false measurement may stand in for a missed one
             missed = max(1.0 - chance / (1.0 + math.exp(log_false)), 1e-300)
-            odds += math.log(chance * math.exp(-log_false - 0.5 * dim) + missed)
-            odds += (1.0 - chance) / chance * math.log(missed)
+            gain = math.log(chance * math.exp(-log_false - 0.5 * dim) + missed)
+            gain += (1.0 - chance) / chance * math.log(missed)
+            odds += gain
+            if gain <= 0.0 and detections > _SETTLED * len(views):
+                break
         if odds > 0.0:
             return float(detections)
         cov = cov - cov @ slope.T @ np.linalg.solve(innovation, slope @ cov)
