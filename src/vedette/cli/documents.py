@@ -18,7 +18,7 @@ def run_document(record: RunRecord, scenario: Scenario | None) -> dict[str, Any]
     Without the scenario, OSPA has no unit and sensors have numbers.
     """
     from vedette.evaluation.comparison import counted_scans, decided_actions
-    from vedette.evaluation.diagnostics import run_diagnostics
+    from vedette.evaluation.diagnostics import record_diagnostics
     from vedette.evaluation.ensembles import PARTS
 
     decisions = [
@@ -34,7 +34,7 @@ def run_document(record: RunRecord, scenario: Scenario | None) -> dict[str, Any]
     ]
     counted = counted_scans(record, scenario)
     window = record.times[counted]
-    unit, sensors = (scenario.model.ospa.unit, scenario.model.sensor_names) if scenario else ("", ())
+    unit = scenario.model.ospa.unit if scenario else ""
     means = dict(zip(PARTS, record.ospa[counted].mean(axis=0), strict=True))
     return {
         "scenario": record.scenario,
@@ -48,8 +48,7 @@ def run_document(record: RunRecord, scenario: Scenario | None) -> dict[str, Any]
         "ospa": {"unit": unit, "from_s": window[0], "to_s": window[-1], **means},
         "seconds": {stage: seconds.sum() for stage, seconds in record.timings.items()},
         "diagnostics": [
-            {"name": each.name, "level": each.level, "text": each.text}
-            for each in run_diagnostics(record.health, sensors)
+            {"name": each.name, "level": each.level, "text": each.text} for each in record_diagnostics(record, scenario)
         ],
     }
 

@@ -97,9 +97,9 @@ def _print_facts(console: Console, record: RunRecord, scenario: Scenario | None)
 
 def _print_diagnostics(console: Console, record: RunRecord, scenario: Scenario | None) -> None:
     """Print the diagnostics that may reduce accuracy; with `--verbose` also notes."""
-    from vedette.evaluation.diagnostics import run_diagnostics
+    from vedette.evaluation.diagnostics import record_diagnostics
 
-    diagnostics = run_diagnostics(record.health, scenario.model.sensor_names if scenario else ())
+    diagnostics = record_diagnostics(record, scenario)
     shown = [each for each in diagnostics if each.level == "check" or (is_verbose() and each.level == "note")]
     if not shown:
         console.print("diagnostics no problem found")

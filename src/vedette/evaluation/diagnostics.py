@@ -12,10 +12,15 @@ from vedette.evaluation.health import HealthSummary, health_sums, percent, summa
 from vedette.internal.text import pluralise
 from vedette.kernels.base.types import Floats
 from vedette.kernels.labelled.set_fusion import LOST, SURE
+from vedette.scenarios import Scenario
+from vedette.scenarios.new_targets import MOST_LATE, NewTargets, new_targets
 from vedette.simulation.health import Health
+from vedette.simulation.records import RunRecord
 
 Level = Literal["ok", "note", "check"]
 _CHECK_ABOVE = 0.01  # share or number above which a truncation should be checked
+_FEW_DROPPED, _MOST_DROPPED = 0.1, 0.5  # shares of the expected births
+_UNLIKELY = 0.01  # probability of so few reported targets
 
 
 class Diagnostic(NamedTuple):
@@ -37,6 +42,19 @@ class Diagnostic(NamedTuple):
 def run_diagnostics(health: Health, sensors: Sequence[str] = ()) -> tuple[Diagnostic, ...]:
     """Return every diagnostic of one run; sensors: their names."""
     return diagnostics(summarise_health(health_sums([health]), sensors))
+
+
+def record_diagnostics(record: RunRecord, scenario: Scenario | None) -> tuple[Diagnostic, ...]:
+    """Return every diagnostic of one run; without the scenario, those of new targets are left out."""
+    if scenario is None:
+        return run_diagnostics(record.health)
+    return (*run_diagnostics(record.health, scenario.model.sensor_names), *birth_diagnostics(record, scenario))
+
+
+def birth_diagnostics(record: RunRecord, scenario: Scenario) -> Iterator[Diagnostic]:
+    """Yield the diagnostics of new targets of one run, by the births that the filter assumes."""
+    labels = {tuple(label) for estimate in record.estimates for label in estimate.labels.tolist()}
+    yield from new_target_diagnostics(new_targets(scenario, record.num_scans), record.health, len(labels))
 
 
 def diagnostics_line(results: Sequence[Diagnostic]) -> str:
@@ -168,4 +186,34 @@ def _measurement_diagnostics(health: HealthSummary) -> Iterator[Diagnostic]:
         "Measurements at places where the clutter intensity was raised to its floor.",
         str(health.clutter_raised),
         _level(health.clutter_raised, math.inf),
+    )
+
+
+def new_target_diagnostics(targets: NewTargets | None, health: Health, num_labels: int) -> Iterator[Diagnostic]:
+    """Yield the diagnostics of new targets; targets: those that are expected in these scans, None if not known."""
+    from scipy.special import gammaincc
+
+    late = 0.0 if targets is None else targets.late_share
+    yield Diagnostic(
+        "New targets",
+        "Median number of detections until the existence probability of a new target exceeds one half, by the assumed "
+        "births, clutter, noise and detection; and the number that it gives in the run, its life or its time in view.",
+        "not known" if targets is None else targets.describe(),
+        "check" if late > MOST_LATE else _level(late, math.inf),
+    )
+    births, expected = (0.0, 0.0) if targets is None else (targets.births.sum(), targets.reported.sum())
+    dropped = health.dropped_existence.sum(axis=0).mean() / births if births else 0.0
+    yield Diagnostic(
+        "Births dropped",
+        "Expected number of targets in dropped labels, in all scans, as a share of the expected number of births.",
+        f"{percent(min(dropped, 1.0))} of {births:.2g} expected, by filter.limits" if births else "not known",
+        _level(dropped if dropped > _FEW_DROPPED else 0.0, _MOST_DROPPED),
+    )
+    chance = float(gammaincc(num_labels + 1, expected))  # of so few, for a Poisson number
+    yield Diagnostic(
+        "Targets reported",
+        "Labels in the estimates, and the number expected from the assumed births, without those that come too late to "
+        "be reported.",
+        f"{num_labels or 'none'}, {expected:.2g} expected (probability {chance:.1g})",
+        "ok" if chance > _UNLIKELY else _level(1.0, math.inf if num_labels else 0.0),
     )

@@ -120,16 +120,14 @@ def probe_jacobian(
     The tolerance is wide (1 % of the largest slope): it detects a wrong sign, index or unit, but not rounding.
     """
     jacobian = probe_array(function, args, shape)
-    slopes = _central_differences(value_function, args, shape, angular)
+    slopes = central_differences(value_function, args, shape, angular)
     scale = np.maximum(np.abs(slopes).max(axis=1, keepdims=True), np.abs(jacobian).max(axis=1, keepdims=True))
     if np.isfinite(slopes).all() and (np.abs(jacobian - slopes) > 0.01 * scale + 1e-6).any():
         raise _fault(function, args, f"the derivative of the function, about {slopes.tolist()}", jacobian.tolist())
     return jacobian
 
 
-def _central_differences(
-    function: ModelFunction, args: tuple[Any, ...], shape: tuple[int, int], angular: Any
-) -> Floats:
+def central_differences(function: ModelFunction, args: tuple[Any, ...], shape: tuple[int, int], angular: Any) -> Floats:
     state, rest = args[0], args[1:]
     slopes = np.empty(shape)
     ahead, behind = np.empty(shape[0]), np.empty(shape[0])

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from vedette.evaluation.diagnostics import Diagnostic, diagnostics
+from vedette.evaluation.diagnostics import Diagnostic, birth_diagnostics, diagnostics
 from vedette.evaluation.health import percent, summarise_health
 from vedette.reports.groups import Group, Strategy
 from vedette.reports.tables import nees_over_runs, nees_spread
@@ -38,11 +38,12 @@ def diagnostics_table(group: Group) -> DiagnosticsTable | None:
 
 
 def strategy_diagnostics(strategy: Strategy) -> Iterator[Diagnostic]:
-    """Yield every check of a strategy: of lost targets, of covariances, of the fusion and of the filters."""
+    """Yield every check of a strategy: of lost targets, covariances, fusion, filters; new targets (first run)."""
     yield _missed(strategy)
     yield _consistency(strategy)
     yield _worst_estimate(strategy)
     yield from diagnostics(summarise_health(strategy.ensemble.health, strategy.scene.names))
+    yield from birth_diagnostics(strategy.record(int(strategy.ensemble.runs[0])), strategy.cell.scenario)
 
 
 def failed_checks(diagnostics: Sequence[Diagnostic]) -> tuple[str, ...]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 import math
+from collections import deque
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
 from typing import Any
@@ -12,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from vedette.control import Plan, Planner
-from vedette.evaluation.diagnostics import diagnostics_line, run_diagnostics
+from vedette.evaluation.diagnostics import diagnostics_line, new_target_diagnostics, run_diagnostics
 from vedette.evaluation.figures.scene import build_scene
 from vedette.evaluation.scans import UNKNOWN
 from vedette.kernels.base.types import Floats
@@ -29,6 +30,7 @@ from vedette.reports.replay import (
     sensor_data,
 )
 from vedette.scenarios import Scenario
+from vedette.scenarios.new_targets import new_targets
 from vedette.scenarios.sections.tracking import UNLABELLED
 from vedette.simulation.health import Health
 from vedette.simulation.records import Decision
@@ -77,6 +79,7 @@ class LiveScreen:
         self._planner = None if live.planner is None else LastPlanCache(live.planner)
         self.live = live if self._planner is None else replace(live, planner=self._planner)
         self._fault = ""
+        self._labels, self._new_targets = deque[set[str]](maxlen=_HEALTH_OF), new_targets(scenario, _HEALTH_OF)
         self._decided: tuple[Plan | None, dict[str, Any] | None] = (None, None)
         model = scenario.model
         self._names, self._sections = model.sensor_names, model.sensors
@@ -106,9 +109,11 @@ class LiveScreen:
         self.page = render("live.html", [run], scripts=("scripts", "live"), name=model.name, untrusted=()).encode()
 
     def note(self, answers: Iterable[Answer]) -> None:
-        """Store the error of the last line that was refused, for display."""
+        """Store the error of the last line that was refused, and the labels of the latest scans."""
         for answer in answers:
             self._fault = answer.get("error", self._fault)
+            if "tracks" in answer:
+                self._labels.append({track["label"] for track in answer["tracks"]})
 
     def frame(self) -> bytes:
         """Return the present state as JSON."""
@@ -190,7 +195,12 @@ class LiveScreen:
         for index, instant in enumerate(latest):
             health.note_filters(index, instant.info.filters)
             health.note_fusion(index, instant.info.fusion)
-        return diagnostics_line(run_diagnostics(health, self._names))
+        results = run_diagnostics(health, self._names)
+        if len(self._labels) == _HEALTH_OF:
+            health.dropped_existence[:] *= _HEALTH_OF / len(latest)
+            of_targets = new_target_diagnostics(self._new_targets, health, len(set().union(*self._labels)))
+            results += tuple(each for each in of_targets if each.level == "check")
+        return diagnostics_line(results)
 
     def _silence(self, state: LiveState) -> list[float | None]:
         """Return the time since the latest scan of each sensor, s, by the clock of the scans; None before its first."""

@@ -14,6 +14,7 @@ from vedette.scenarios.coastline import coastline_warnings
 from vedette.scenarios.coverage_warnings import coverage_warnings
 from vedette.scenarios.diagnostics import Diagnostic, Path
 from vedette.scenarios.loading import Scenario, locate_fault, read_document
+from vedette.scenarios.new_targets import new_target_warnings
 from vedette.scenarios.sections import ScenarioModel
 from vedette.scenarios.sections.birth_labels import (
     birth_probabilities,
@@ -65,7 +66,8 @@ def scenario_warnings(scenario: Scenario, more: Iterable[tuple[Path, str]] = ())
         *_undetected_value(scenario.model),
     ]
     warnings += coverage_warnings(scenario.model)
-    warnings += [*_undetected_births(scenario.model), *_missed_targets(scenario), *start_warnings(scenario)]
+    warnings += [*_undetected_births(scenario.model), *_missed_targets(scenario)]
+    warnings += [*start_warnings(scenario), *new_target_warnings(scenario)]
     warnings += [*implausible_settings(scenario.model), *coastline_warnings(scenario.model, scenario.folder), *more]
     if not warnings:
         return ()

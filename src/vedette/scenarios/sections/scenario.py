@@ -118,8 +118,8 @@ class ScenarioModel(Section):
     )
     estimator: AnyEstimator | None = Field(
         default=None,
-        description="How estimates are read off; none: with a filter of kind factored_glmb, or lmb with births: poisson, "
-        "least_gospa if control.reward is expected_gospa, else least_ospa; with other filters map [-].",
+        description="How estimates are read off; none: with a filter of kind factored_glmb, or lmb with births: "
+        "poisson, least_gospa if control.reward is expected_gospa, else least_ospa; with other filters map [-].",
     )
     control: Control = Field(default=Control(), description="When and how the sensors decide [-].")
     planners: dict[Name, AnyPlanner] = Field(

@@ -111,7 +111,7 @@ def searches_by_default(model: ScenarioModel) -> bool:
 
 def _may_be_found(model: ScenarioModel) -> bool:
     """Return True if there is an intensity to search: of births anywhere, or at sites if a view has an edge."""
-    if not _has_intensity(model):
+    if not has_intensity(model):
         return False
     at_sites = bool(model.birth.sites) and any(field_of_view(sensor) is not None for sensor in model.sensors)
     return at_sites or model.birth.from_measurements is not None
@@ -127,7 +127,7 @@ def _cells_a_side(model: ScenarioModel) -> int:
 def learnt_births(model: ScenarioModel) -> Iterator[Finding]:
     """Yield faults of learnt birth rates if beliefs have no intensity of undetected targets."""
     measured, section = model.birth.from_measurements, model.undetected
-    if _has_intensity(model):
+    if has_intensity(model):
         return
     wanted = (
         "a number, as only one belief of all scans by filter.kind factored_glmb or lmb with births: poisson learns it"
@@ -138,7 +138,7 @@ def learnt_births(model: ScenarioModel) -> Iterator[Finding]:
         yield ("undetected", "birth_rate"), wanted, describe(section.birth_rate)
 
 
-def _has_intensity(model: ScenarioModel) -> bool:
+def has_intensity(model: ScenarioModel) -> bool:
     """Return True if undetected targets are an intensity of the single belief of all scans."""
     filters, fusion = model.filter, model.fusion
     if (
