@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 from functools import lru_cache
-from typing import TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -196,8 +196,8 @@ def _reduction(limits: Limits) -> Reduction:
 @lru_cache(maxsize=1000)
 def _for_births(limits: Limits, birth: BirthModel, clutter_rate: float) -> Limits:
     faintest = _SHARE_OF_BIRTH * birth.least_existence(clutter_rate)
-    names = [name for name in _RELATIVE_TO_BIRTHS if faintest < getattr(limits, name) < 1.0]
-    return replace(limits, **dict.fromkeys(names, faintest)) if names else limits
+    lowered: dict[str, Any] = {name: faintest for name in _RELATIVE_TO_BIRTHS if faintest < getattr(limits, name) < 1.0}
+    return replace(limits, **lowered) if lowered else limits
 
 
 @lru_cache(maxsize=1000)
