@@ -27,9 +27,9 @@ from vedette.kernels.labelled.splitting import Choices, choices_of, independent_
 from vedette.kernels.labelled.track_merging import merge_versions
 from vedette.kernels.steps.assembly import assemble
 from vedette.kernels.steps.factor_groups import Group
+from vedette.kernels.steps.faint_labels import Background, outweighs_undetected
 from vedette.kernels.steps.glmb import kept_children
 from vedette.kernels.steps.lmb import Reduction, append_reduced, write_mixture
-from vedette.kernels.steps.undetected import Undetected, outweighs_undetected
 
 # Indices of the sums of a scan; see `FactoredReport`.
 TOTAL, KEPT, TWICE, SPLIT, DROPPED, CUT, FULL, REDUCED = range(8)
@@ -65,13 +65,13 @@ class Work(NamedTuple):
     claimed: Floats  # (num_measurements,) expected number of groups that take each
     sums: Floats  # (_NUM_SUMS,)
     reducing: ReductionWork  # for the number of components of `wide`
-    undetected: Undetected  # at the time of the scan, before it
+    background: Background  # undetected targets before the scan
     faint: Mixture  # one Gaussian of each dropped label, weighted by its existence
     num_faint: Ints  # (1,) their number
 
 
 @kernel
-def make_work(rows: Rows, options: Options, undetected: Undetected) -> Work:
+def make_work(rows: Rows, options: Options, background: Background) -> Work:
     widest = 0
     for row in range(len(rows.log_absent)):
         num_options = options.offsets[row + 1] - options.offsets[row]
@@ -84,7 +84,7 @@ def make_work(rows: Rows, options: Options, undetected: Undetected) -> Work:
         np.zeros(options.num_measurements),
         np.zeros(_NUM_SUMS),
         make_reduction_work(widest, rows.components),
-        undetected,
+        background,
         components_like(rows.components, len(rows.log_absent)),
         np.zeros(1, np.int64),
     )
@@ -117,7 +117,7 @@ def _append_mixture(
         k, faint = work.num_faint[0], work.faint
         one = MixtureCaps(caps.log_min_weight, caps.merge_distance, 1)
         reduce_into(wide, width, one, reducing, faint, k)
-        if not outweighs_undetected(existence, faint.means[k], faint.covs[k], work.undetected):
+        if not outweighs_undetected(existence, faint.means[k], faint.covs[k], work.background):
             faint.log_weights[k] = log_or_minus_inf(existence)
             work.sums[DROPPED] += existence
             work.num_faint[0] += 1

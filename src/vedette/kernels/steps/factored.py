@@ -57,16 +57,15 @@ from vedette.kernels.steps.factor_updates import (
     update_alone,
     update_group,
 )
+from vedette.kernels.steps.faint_labels import Background, add_to_cells, background_of, with_returned
 from vedette.kernels.steps.lmb import Reduction
 from vedette.kernels.steps.undetected import (
     Arrivals,
     Left,
     Undetected,
-    add_to_cells,
     intensity_at_places,
     left_in_cells,
     predicted_undetected,
-    with_returned,
 )
 
 
@@ -132,7 +131,7 @@ def _associate(
 @kernel
 def _update_groups(
     prior: FactoredGlmb,
-    undetected: Undetected,
+    background: Background,
     found: _Associated,
     truncation: Truncation,
     reduction: Reduction,
@@ -149,7 +148,7 @@ def _update_groups(
     leaders = linked_factors(options, alone, factors.row_offsets, sizes, factoring.max_cut, factoring.max_together)
     log_twice = apply_contention(options, groups_of_rows(factors, leaders), alone, rows.offsets)
     offsets, members = group_members(leaders, len(leaders))
-    work, ranking, most_labels = make_work(rows, options, undetected), make_ranking(), 0
+    work, ranking, most_labels = make_work(rows, options, background), make_ranking(), 0
     widest = len(work.wide.log_weights)
     store = make_store(len(rows.log_absent), 2 * len(rows.components.log_weights), rows.components)
     for leader in range(len(leaders)):
@@ -190,7 +189,8 @@ def step_factored(
     if motion is not None:
         undetected = predicted_undetected(undetected, motion, scan.dt, arrivals)
     found = _associate(prior, undetected, scan, motion, sensor, truncation, reduction.min_existence_logit)
-    density, work, log_twice, most_labels = _update_groups(prior, undetected, found, truncation, reduction, factoring)
+    background = background_of(undetected)
+    density, work, log_twice, most_labels = _update_groups(prior, background, found, truncation, reduction, factoring)
     require_gaussians(density.tracks.components.means, density.tracks.components.covs)
     num = len(undetected.intensity.log_weights)
     missed, log_missed = missed_intensity(found.seen, scan, sensor, num, found.left_out)
@@ -199,7 +199,7 @@ def step_factored(
     add_to_cells(left.tables, undetected.cells, undetected.places, found.left_out[num:])
     return (
         density,
-        with_returned(missed, left.tables, undetected.cells, found_faint(work)),
+        with_returned(missed, left.tables, undetected.cells, background, found_faint(work)),
         left,
         FactoredReport(
             sums[TOTAL] + log_twice + log_missed + found.log_left_out,

@@ -13,23 +13,11 @@ import numpy as np
 from vedette.errors import ModelError
 from vedette.kernels.base.compile import borrowing, inlined, kernel
 from vedette.kernels.base.types import Floats, Mixture, Motion, Sensor
-from vedette.kernels.gaussian.components import (
-    copy_component,
-    make_components,
-    merge_components,
-    own_components,
-    stacked_mixtures,
-)
+from vedette.kernels.gaussian.components import make_components
 from vedette.kernels.gaussian.intensities import predicted_intensity
-from vedette.kernels.gaussian.linalg import log_add
 
 # Standard deviations of a birth's position that represent "anywhere" about a measurement: wide relative to the noise.
 WIDE = 3.0
-
-# Far from all births, the density of undetected targets counts as this share of its largest value: a lost target is
-# kept down to a millionth of the odds of a new one.
-_FAR = 1e-6
-_FAR_SQUARED = -2.0 * math.log(_FAR)  # squared Mahalanobis distance at which a Gaussian has this share of its peak
 
 
 class Cells(NamedTuple):
@@ -175,115 +163,25 @@ def predicted_undetected(before: Undetected, motion: Motion, dt: float, arrivals
     )
 
 
-@borrowing
-def _cell_at(place: Floats, cells: Cells, num_cells: int) -> int:
+@inlined
+def cell_at(
+    x: float, y: float, corner_x: float, corner_y: float, width: float, height: float, num_columns: int, num_cells: int
+) -> int:
     """Return the index of the cell of a place; -1 outside of the region."""
-    column = np.floor((place[0] - cells.corner[0]) / cells.size[0])
-    row = np.floor((place[1] - cells.corner[1]) / cells.size[1])
-    if not (0 <= column < cells.num_columns and 0 <= row < num_cells // cells.num_columns):
+    if num_cells == 0:
         return -1
-    return int(row) * cells.num_columns + int(column)
+    column, row = np.floor((x - corner_x) / width), np.floor((y - corner_y) / height)
+    if not (0 <= column < num_columns and 0 <= row < num_cells // num_columns):
+        return -1
+    return int(row) * num_columns + int(column)
 
 
 @borrowing
 def _density_at(place: Floats, cells: Cells, table: Floats) -> float:
     """Return targets per square metre; 0 outside of the region."""
-    cell = _cell_at(place, cells, len(table))
-    return float(table[cell] / (cells.size[0] * cells.size[1])) if cell >= 0 else 0.0
-
-
-@inlined
-def _site_density(
-    intensity: Mixture, c: int, place: Floats, xx: float, yy: float, xy: float
-) -> tuple[float, float, float]:
-    """Return the density of component `c` at a place, its peak density, and the squared Mahalanobis distance.
-
-    xx, yy, xy: covariance of the place, added to that of the component.
-    """
-    cov = intensity.covs[c]
-    x, y = place[0] - intensity.means[c, 0], place[1] - intensity.means[c, 1]
-    xx, yy, xy = cov[0, 0] + xx, cov[1, 1] + yy, cov[0, 1] + xy
-    det = xx * yy - xy * xy
-    squared = (x * x * yy - 2.0 * x * y * xy + y * y * xx) / det
-    peak = math.exp(intensity.log_weights[c]) / (2.0 * math.pi * math.sqrt(det))
-    return peak * math.exp(-0.5 * squared), peak, squared
-
-
-@borrowing
-def outweighs_undetected(existence: float, mean: Floats, cov: Floats, undetected: Undetected) -> bool:
-    """Return True if a detection at a label's place is more probably of this label than of an undetected target.
-
-    Compared are the densities of the position, each averaged over that of the label. Both first detections and further
-    detections have odds of P_D times this density over that of clutter, so neither P_D nor clutter matters. A label of
-    a smaller density has no effect on later odds. Without undetected targets every label is below.
-
-    mean, cov: of the label.
-    """
-    xx, yy, xy = cov[0, 0], cov[1, 1], cov[0, 1]
-    density, largest, intensity = 0.0, 0.0, undetected.intensity
-    for c in range(len(intensity.log_weights)):
-        own, peak, _ = _site_density(intensity, c, mean, xx, yy, xy)
-        density += own
-        largest += peak
-    if len(undetected.tables) > 0:
-        table, cells = undetected.tables[0], undetected.cells
-        density += _density_at(mean, cells, table)
-        largest += table.sum() / (len(table) * cells.size[0] * cells.size[1])
-    density = max(density, _FAR * largest)
-    return 0.0 < density < existence / (4.0 * math.pi * math.sqrt(xx * yy - xy * xy))
-
-
-@borrowing
-def _nearest_site(intensity: Mixture, num: int, mean: Floats, cov: Floats) -> tuple[int, float]:
-    """Return which of the first `num` components has the largest density at a Gaussian, and that density.
-
-    -1 if all are far.
-    """
-    best, largest = -1, 0.0
-    for c in range(num):
-        density, _, squared = _site_density(intensity, c, mean, cov[0, 0], cov[1, 1], cov[0, 1])
-        if squared < _FAR_SQUARED and density > largest:
-            best, largest = c, density
-    return best, largest
-
-
-@kernel
-def with_returned(intensity: Mixture, tables: Floats, cells: Cells, returned: Mixture) -> Mixture:
-    """Return the intensity with further Gaussians; in a region, their expected numbers are added to its cells.
-
-    A Gaussian near a component is merged with it, with the moments of both; far ones become components. The total
-    expected number grows by theirs.
-
-    tables: (num_tables, num_cells) as in `Undetected`; the first is written. returned: the Gaussians, weighted by their
-    expected numbers.
-    """
-    num = len(intensity.log_weights)
-    out, filled = stacked_mixtures(intensity, returned), num
-    one, pair, weights = own_components(returned, min(1, len(returned.log_weights))), np.empty(2, np.int64), np.empty(2)
-    for k in range(len(returned.log_weights)):
-        mean, weight = returned.means[k], math.exp(returned.log_weights[k])
-        site, density = _nearest_site(out, num, mean, returned.covs[k])
-        cell = _cell_at(mean, cells, tables.shape[1]) if len(tables) > 0 else -1
-        if cell >= 0 and tables[0, cell] >= density * cells.size[0] * cells.size[1]:
-            tables[0, cell] += weight
-        elif site >= 0:
-            pair[0], pair[1], weights[0], weights[1] = site, num + k, math.exp(out.log_weights[site]), weight
-            merge_components(out, pair, weights, 2, one, 0)
-            one.log_weights[0] = log_add(out.log_weights[site], returned.log_weights[k])
-            copy_component(one, 0, out, site)
-        else:
-            copy_component(returned, k, out, filled)
-            filled += 1
-    return own_components(out, filled)
-
-
-@kernel
-def add_to_cells(tables: Floats, cells: Cells, places: Floats, numbers: Floats) -> None:
-    """Add expected numbers (num,) to the cells of places (num, state_dim) in the first table, if there is one."""
-    for k in range(len(places) if len(tables) > 0 else 0):
-        cell = _cell_at(places[k], cells, tables.shape[1])
-        if cell >= 0:
-            tables[0, cell] += numbers[k]
+    corner, size = cells.corner, cells.size
+    cell = cell_at(place[0], place[1], corner[0], corner[1], size[0], size[1], cells.num_columns, len(table))
+    return float(table[cell] / (size[0] * size[1])) if cell >= 0 else 0.0
 
 
 @kernel
@@ -333,7 +231,12 @@ def _share_born(undetected: Undetected, place: Floats) -> float:
     """
     intensity, std, elsewhere = undetected.intensity, undetected.std, 0.0
     for c in range(len(intensity.log_weights)):
-        elsewhere += _site_density(intensity, c, place, (0.5 * std[0]) ** 2, (0.5 * std[1]) ** 2, 0.0)[0]
+        cov = intensity.covs[c]
+        x, y = place[0] - intensity.means[c, 0], place[1] - intensity.means[c, 1]
+        xx, yy, xy = cov[0, 0] + (0.5 * std[0]) ** 2, cov[1, 1] + (0.5 * std[1]) ** 2, cov[0, 1]
+        det = xx * yy - xy * xy
+        squared = (x * x * yy - 2.0 * x * y * xy + y * y * xx) / det
+        elsewhere += math.exp(intensity.log_weights[c] - 0.5 * squared) / (2.0 * math.pi * math.sqrt(det))
     born = undetected.birth_rate * _density_at(place, undetected.cells, undetected.tables[1])
     total = elsewhere + _density_at(place, undetected.cells, undetected.tables[0])
     return float(born / total) if born > 0.0 else 0.0
