@@ -35,8 +35,9 @@ from vedette.kernels.steps.lmb import Reduction, append_reduced, write_mixture
 TOTAL, KEPT, TWICE, SPLIT, DROPPED, CUT, FULL, REDUCED = range(8)
 _NUM_SUMS = 8
 
-# A component of a label that is alone is dropped if its expected number of targets is below this times the least share.
-_WORTH = 10.0
+# A component of a label that is alone is dropped if its expected number of targets is below _WORTH times the least share,
+# and it has less than _FAINT_SHARE (log) of its label.
+_WORTH, _FAINT_SHARE = 10.0, math.log(0.1)
 
 # A posterior is condensed if the hypotheses beyond the share _KEPT_APART of the longest list weigh more than
 # _MOST_BEHIND: the next scan has many times as many, and most of those cut off hold more targets than those kept. The
@@ -123,7 +124,7 @@ def _append_mixture(
             work.num_faint[0] += 1
             return
     # An improbable label keeps few components, to save time.
-    log_least = min(0.0, caps.log_min_weight + math.log(_WORTH / existence))
+    log_least = min(_FAINT_SHARE, caps.log_min_weight + math.log(_WORTH / existence))
     caps = MixtureCaps(log_least, caps.merge_distance, caps.max_components)
     end = append_reduced(wide, width, caps, reducing, store.components, start)
     work.sums[REDUCED] += existence * reduction_bound(wide, width, store.components, start, end, reducing)
