@@ -97,7 +97,7 @@ def test_the_truth_is_drawn_from_the_model() -> None:
                 moves.append(states[~new] - model.motion.propagate(states_before[np.isin(before, ids)], 0.5))
     first, *counts = np.array(born).T
     for count, chance in zip(counts, birth.existence, strict=True):
-        assert count[first == 1].mean() == pytest.approx(1.0 - (1.0 - chance) ** 0.5, abs=0.06)  # one second
+        assert count[first == 1].mean() == pytest.approx(chance, abs=0.06)  # one period
         assert count[first == 0].mean() == pytest.approx(1.0 - (1.0 - chance) ** 0.25, abs=0.03)
     assert np.concatenate(lived).mean() == pytest.approx(0.8, abs=0.03)
     np.testing.assert_allclose(np.concatenate(starts).std(axis=0), [10.0, 10.0, 2.0, 2.0], rtol=0.1)

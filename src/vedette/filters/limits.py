@@ -43,8 +43,8 @@ class Limits:
     Attributes:
         max_hypotheses: largest number of hypotheses, for a factored density in each factor; for an LMB, of joint
             choices summed in a cluster too large for the exact sum.
-        min_relative_weight: hypotheses lighter than this times the heaviest are dropped, with labelled births only if
-            this share is below a tenth of the weakest birth; in a CPHD filter the large numbers of targets less
+        min_relative_weight: hypotheses lighter than this times the heaviest are dropped (if a labelled birth is weaker
+            than this, those below a tenth of the weakest birth); in a CPHD filter the large numbers of targets less
             probable than this times the most probable.
         min_track_weight: for every label and each association with the scan (missed, or detected as a given
             measurement), the heaviest such hypothesis is kept, in up to half of `max_hypotheses`, while its weight is
@@ -58,10 +58,10 @@ class Limits:
             or CPHD filter, are dropped.
         merge_distance: Mahalanobis distance within which components of a track are merged; 0 merges none.
         max_components: largest number of components per track; 1 keeps one moment-matched Gaussian.
-        min_existence: labels of an LMB or alone in their factor, or Bernoullis, less probable than this are dropped,
-            but only if they do not change what later detections mean: if undetected targets are an intensity, if a
-            detection at their place is more probably of an undetected target; if births are labelled, if they are less
-            probable than a tenth of the weakest birth.
+        min_existence: labels of an LMB or alone in their factor, or Bernoullis, less probable than this are dropped. If
+            undetected targets are an intensity, only if a detection at their place is more probably of an undetected
+            target; if a labelled birth is weaker than this, only below a tenth of the weakest birth. Such labels have
+            no effect on what later detections mean.
         max_labels: largest number of labels of an LMB or a factored density, or of Bernoullis of a multi-Bernoulli; the
             most probable ones are kept.
         max_position_std: labels whose position std exceeds this along both axes are dropped after the scan: targets
@@ -116,7 +116,7 @@ class Limits:
         return _truncation(self, meas_dim)
 
     def for_births(self, birth: BirthModel, clutter_rate: float) -> Limits:
-        """Return the limits of a filter with labelled births, which keep what is as improbable as a tenth of a birth.
+        """Return the limits of a filter with labelled births: thresholds above a birth become a tenth of the weakest.
 
         clutter_rate: mean number of false measurements of a scan.
         """
@@ -195,8 +195,9 @@ def _reduction(limits: Limits) -> Reduction:
 
 @lru_cache(maxsize=1000)
 def _for_births(limits: Limits, birth: BirthModel, clutter_rate: float) -> Limits:
-    faintest = _SHARE_OF_BIRTH * birth.least_existence(clutter_rate)
-    lowered: dict[str, Any] = {name: faintest for name in _RELATIVE_TO_BIRTHS if faintest < getattr(limits, name) < 1.0}
+    least = birth.least_existence(clutter_rate)
+    names = [name for name in _RELATIVE_TO_BIRTHS if least < getattr(limits, name) < 1.0]
+    lowered: dict[str, Any] = dict.fromkeys(names, _SHARE_OF_BIRTH * least)
     return replace(limits, **lowered) if lowered else limits
 
 

@@ -35,8 +35,8 @@ from vedette.kernels.steps.lmb import Reduction, append_reduced, write_mixture
 TOTAL, KEPT, TWICE, SPLIT, DROPPED, CUT, FULL, REDUCED = range(8)
 _NUM_SUMS = 8
 
-# A component of a label that is alone is dropped if its expected number of targets is below _WORTH times the least share,
-# and it has less than _FAINT_SHARE (log) of its label.
+# A component of a label that is alone is dropped if its expected number of targets is below _WORTH times the least
+# share of a component, and it has less than _FAINT_SHARE (log) of its label.
 _WORTH, _FAINT_SHARE = 10.0, math.log(0.1)
 
 # A posterior is condensed if the hypotheses beyond the share _KEPT_APART of the longest list weigh more than
