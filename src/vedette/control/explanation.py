@@ -179,7 +179,12 @@ class Explanation:
         return Explanation(**values)
 
     def __repr__(self) -> str:
-        return text_of(self)
+        lines = [*_of_choice(self), *_of_targets(self), *_of_sensors(self)]
+        reasons: dict[str, list[str]] = {}
+        for name, reason in self.missing.items():
+            reasons.setdefault(reason, []).append(name)
+        lines += [f"no {', '.join(names)}: {reason}" for reason, names in reasons.items()]
+        return "\n".join(part for line in lines for part in _wrapped(line))
 
 
 # Fields that may be None, with a reason.
@@ -192,16 +197,6 @@ def _ratio(difference: float, error: float | None) -> float | None:
     if error == 0.0 or np.isnan(error):
         return math.copysign(math.inf, difference) if difference != 0.0 else 0.0
     return difference / error
-
-
-def text_of(explanation: Explanation) -> str:
-    """Return a text of the reward, the margin to the runner-up, and the ten largest contributions."""
-    lines = [*_of_choice(explanation), *_of_targets(explanation), *_of_sensors(explanation)]
-    reasons: dict[str, list[str]] = {}
-    for name, reason in explanation.missing.items():
-        reasons.setdefault(reason, []).append(name)
-    lines += [f"no {', '.join(names)}: {reason}" for reason, names in reasons.items()]
-    return "\n".join(part for line in lines for part in _wrapped(line))
 
 
 def _wrapped(line: str) -> list[str]:

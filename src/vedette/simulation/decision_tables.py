@@ -72,7 +72,7 @@ def decision_tables(decisions: Sequence[Decision], num_sensors: int) -> dict[str
             **decision_columns(number, decision),
             "planner": decision.plan.planner,
             "notes": _notes(decision.plan),
-            **_counts(decision.plan),
+            **{f"num_{name}": count for name, count in decision.plan.counts.items()},
         }
         for number, decision in enumerate(decisions)
     ]
@@ -96,10 +96,6 @@ def decision_tables(decisions: Sequence[Decision], num_sensors: int) -> dict[str
     }
     layout = OWN_REWARDS["own_rewards"]
     return {**columns, "own_rewards": stacked(own_rows, layout, list(layout.fixed))} if own_rows else columns
-
-
-def _counts(plan: Plan) -> dict[str, int]:
-    return {f"num_{name}": count for name, count in plan.counts.items()}
 
 
 def _evaluated(table: RewardTable, plan: Plan) -> dict[str, Any]:
