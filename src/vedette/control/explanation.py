@@ -231,13 +231,13 @@ def _of_choice(explanation: Explanation) -> list[str]:
     return lines
 
 
-def margin_text(runner_up: RunnerUp, reward: float) -> str:
+def margin_text(runner_up: RunnerUp, reward: float, sign: str = "+-", brackets: tuple[str, str] = (" (", ")")) -> str:
     """Return the margin as text, such as `less by 0.12 +- 0.03 (4 standard errors)`."""
     if abs(runner_up.margin) <= _SAME * max(1.0, abs(reward)):
         return "as good"
     ratio = runner_up.in_standard_errors
-    apart = "" if ratio is None or np.isinf(ratio) else f" ({ratio:.2g} standard errors)"
-    return f"less by {with_error(runner_up.margin, runner_up.standard_error)}{apart}"
+    apart = "" if ratio is None or np.isinf(ratio) else f"{ratio:.2g} standard errors".join(brackets)
+    return f"less by {with_error(runner_up.margin, runner_up.standard_error, sign)}{apart}"
 
 
 def _of_targets(explanation: Explanation) -> list[str]:

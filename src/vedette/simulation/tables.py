@@ -96,7 +96,7 @@ def record_of(
 
     Raises `InputError`, `KeyError`, `TypeError` or `ValueError` for inconsistent tables.
     """
-    summary, poses = summary_of(facts, tables, timings), _poses_of(tables)
+    summary, poses, file = summary_of(facts, tables, timings), _poses_of(tables), facts.get("recording")
     times, decisions = summary.times, summary.decisions
     if any(name in tables for name in EXPLANATION_TABLES):
         decisions = with_explanations(decisions, tables)
@@ -119,12 +119,8 @@ def record_of(
         health=summary.health,
         timings=timings,
         stopped=None if facts["stopped"] is None else str(facts["stopped"]),
-        recording=_recording_of(facts.get("recording")),
+        recording=None if file is None else ScansFile(str(file["name"]), str(file["sha256"])),
     )
-
-
-def _recording_of(fact: Any) -> ScansFile | None:
-    return None if fact is None else ScansFile(str(fact["name"]), str(fact["sha256"]))
 
 
 # Tables that `summary_of` needs.
@@ -182,7 +178,7 @@ def _truth(record: RunRecord) -> Columns:
 
 
 def _tracks(record: RunRecord) -> Columns:
-    scans = np.repeat(np.arange(record.num_scans), _counts(record))
+    scans = np.repeat(np.arange(record.num_scans), [len(estimate.labels) for estimate in record.estimates])
     labels = np.concatenate([estimate.labels for estimate in record.estimates])
     covs = np.concatenate([estimate.covs for estimate in record.estimates])
     return {
@@ -221,10 +217,6 @@ def _sensors(record: RunRecord) -> Columns:
         **{name: getattr(record.health, name).ravel() for name in SENSOR_COLUMNS},
         **({OFF: record.off.ravel().astype(np.int64)} if record.off.any() else {}),
     }
-
-
-def _counts(record: RunRecord) -> Ints:
-    return np.array([len(estimate.labels) for estimate in record.estimates], np.int64)
 
 
 def _columns(start: str, matrix: Floats) -> Columns:

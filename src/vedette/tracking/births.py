@@ -117,7 +117,8 @@ def births_from_scans(
     if len(scanned) == 1:
         births = _births_of_single_sensor(belief, sensors[scanned[0]], scans[scanned[0]], checked[0], parameters)
     else:
-        births = _births_of_pool(unexplained_measurements(model, belief, sensors, scans, poses), parameters)
+        pool = unexplained_measurements(model, belief, sensors, scans, poses)
+        births = LMB.from_kernel(births_of_measurements(pool.states, pool.probabilities, parameters))
     births = with_velocities(births, model.std, sensors, scans, poses)
     return at_scan_time(births, checked)
 
@@ -272,7 +273,3 @@ class _Cells:
     def _cell(self, place: Floats) -> tuple[float, float]:
         x, y = np.floor(place / self._size).tolist()
         return x, y
-
-
-def _births_of_pool(measurements: UnexplainedMeasurements, parameters: BirthsOfMeasurements) -> LMB:
-    return LMB.from_kernel(births_of_measurements(measurements.states, measurements.probabilities, parameters))
