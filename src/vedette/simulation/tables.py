@@ -16,7 +16,7 @@ import numpy as np
 
 from vedette.densities.estimates import Estimate
 from vedette.errors import InputError
-from vedette.kernels.base.types import Bools, Floats, Ints
+from vedette.kernels.base.types import Floats, Ints
 from vedette.simulation.arrow import Columns, Kind, Layout
 from vedette.simulation.decision_tables import DECISION_TABLES, OWN_REWARDS, decision_tables, decisions_of
 from vedette.simulation.explanation_tables import EXPLANATION_TABLES, explanation_tables, with_explanations
@@ -98,6 +98,7 @@ def record_of(
     """
     summary, poses, file = summary_of(facts, tables, timings), _poses_of(tables), facts.get("recording")
     times, decisions = summary.times, summary.decisions
+    off = tables["sensors"].get(OFF, np.zeros(poses.shape[:2]))
     if any(name in tables for name in EXPLANATION_TABLES):
         decisions = with_explanations(decisions, tables)
     if "undetected" in tables:
@@ -112,7 +113,7 @@ def record_of(
             times, _offsets(tables["truth"], len(times)), tables["truth"]["target"], _matrix(tables["truth"], "state_")
         ),
         poses=poses,
-        off=_off_of(tables, poses),
+        off=np.reshape(off == 1, poses.shape[:2]),
         estimates=_estimates_of(tables["tracks"], len(times)),
         decisions=decisions,
         ospa=summary.ospa,
@@ -163,12 +164,6 @@ def _poses_of(tables: Mapping[str, Mapping[str, Any]]) -> Floats:
         )
     columns = [*POSE_COLUMNS, *(name for name in sensors if name.startswith("pose_"))]
     return np.stack([sensors[name] for name in columns], axis=1).reshape(num_scans, -1, len(columns))
-
-
-def _off_of(tables: Mapping[str, Mapping[str, Any]], poses: Floats) -> Bools:
-    """(num_scans, num_sensors)."""
-    off = tables["sensors"].get(OFF)
-    return np.zeros(poses.shape[:2], np.bool_) if off is None else (off == 1).reshape(poses.shape[:2])
 
 
 def _truth(record: RunRecord) -> Columns:

@@ -115,7 +115,12 @@ def births_from_scans(
     scanned = [s for s, scan in enumerate(scans) if scan is not None]
     checked = [pose_vector("pose", poses[s]) for s in scanned]
     if len(scanned) == 1:
-        births = _births_of_single_sensor(belief, sensors[scanned[0]], scans[scanned[0]], checked[0], parameters)
+        sensor, lmb = sensors[scanned[0]], _as_kernel(belief)
+        scan = _scan_input(lmb, sensor, scans[scanned[0]], checked[0])
+        states = sensor.measurement.states_at(scan.measurements, scan.pose, len(parameters.std))
+        models = sensor.to_kernel(), _truncation(sensor.meas_dim)
+        with model_errors():
+            births = LMB.from_kernel(births_unexplained(lmb, scan, states, *models, MIN_UNEXPLAINED, parameters))
     else:
         pool = unexplained_measurements(model, belief, sensors, scans, poses)
         births = LMB.from_kernel(births_of_measurements(pool.states, pool.probabilities, parameters))
@@ -193,18 +198,6 @@ def _unexplained_by_sensor(
         scan_input.measurements[indices], scan_input.pose, belief.tracks.components.means.shape[1]
     )
     return UnexplainedMeasurements(states, 1.0 - explained[indices], np.full(len(indices), number))
-
-
-def _births_of_single_sensor(
-    belief: LabelledDensity, sensor: SensorModel, scan: Any, pose: Floats, parameters: BirthsOfMeasurements
-) -> LMB:
-    """Return the birth candidates from the scan of a single sensor."""
-    lmb = _as_kernel(belief)
-    scan_input = _scan_input(lmb, sensor, scan, pose)
-    states = sensor.measurement.states_at(scan_input.measurements, scan_input.pose, len(parameters.std))
-    models = sensor.to_kernel(), _truncation(sensor.meas_dim)
-    with model_errors():
-        return LMB.from_kernel(births_unexplained(lmb, scan_input, states, *models, MIN_UNEXPLAINED, parameters))
 
 
 @cache
