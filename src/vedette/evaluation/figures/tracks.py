@@ -39,7 +39,7 @@ from vedette.evaluation.figures.style import (
 )
 from vedette.internal.text import named_in
 from vedette.kernels.base.types import Floats, Ints
-from vedette.simulation.records import Decision, RunRecord
+from vedette.simulation.records import RunRecord
 
 LARGE = 5000.0  # m; axes of a larger extent are in kilometres
 _MANY_SCANS = 200  # with more scans, estimates are drawn smaller
@@ -226,18 +226,18 @@ def _draw_sensor(
             continue
         place = _point(decision.poses[sensor, :2] * scale)
         arrow = {"arrowstyle": "<|-", "color": INK, "linewidth": 0.9, "shrinkA": 0, "shrinkB": 0}
-        direction = 13.0 * _direction(decision, sensor)
+        plan = decision.plan
+        row = dict(zip(plan.actions[sensor].columns, plan.chosen_actions[sensor].tolist(), strict=True))
+        direction = 13.0 * _direction(row)
         if direction.any():
             axes.annotate("", place, xytext=_point(direction), textcoords="offset points", arrowprops=arrow, zorder=7)
-        _draw_field(axes, decision, sensor, 0.12 * plot_extent([record]), scale)
+        _draw_field(axes, row, decision.poses[sensor], 0.12 * plot_extent([record]), scale)
         axes.plot(*place, marker="o", markersize=6.0, color=INK, markerfacecolor="white", markeredgewidth=0.7, zorder=8)
         axes.annotate(str(number), place, ha="center", va="center_baseline", fontsize=5, zorder=9)
 
 
-def _draw_field(axes: Axes, decision: Decision, sensor: int, size: float, scale: float) -> None:
+def _draw_field(axes: Axes, row: dict[str, float], pose: Floats, size: float, scale: float) -> None:
     """Draw a sector of a given size in the chosen pointing direction of the sensor."""
-    plan, pose = decision.plan, decision.poses[sensor]
-    row = dict(zip(plan.actions[sensor].columns, plan.chosen_actions[sensor].tolist(), strict=True))
     middle = drawn_angle(row, "pointing_deg", "azimuth_deg")
     if middle is not None:
         half = row.get("half_width_deg", float(np.rad2deg(pose[4])) if len(pose) > 4 else 0.0)
@@ -245,10 +245,8 @@ def _draw_field(axes: Axes, decision: Decision, sensor: int, size: float, scale:
         axes.add_patch(Wedge(_point(pose[:2] * scale), size * scale, *sides, color=INK, alpha=0.2, lw=0, zorder=5))
 
 
-def _direction(decision: Decision, sensor: int) -> Floats:
+def _direction(row: dict[str, float]) -> Floats:
     """Return the unit vector of the sensor's chosen direction; 0 if its action is neither a heading nor a step."""
-    plan = decision.plan
-    row = dict(zip(plan.actions[sensor].columns, plan.chosen_actions[sensor].tolist(), strict=True))
     heading = drawn_angle(row)
     if heading is not None and row.get("distance_m") != 0.0:
         return np.array([np.cos(np.deg2rad(heading)), np.sin(np.deg2rad(heading))])
