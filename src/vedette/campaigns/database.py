@@ -14,6 +14,7 @@ from typing import Any
 
 from vedette.campaigns.rows import Entry, verified
 from vedette.errors import InputError
+from vedette.internal.files import locked
 from vedette.internal.reading import error_summary
 from vedette.internal.text import printable, shown
 
@@ -143,23 +144,9 @@ def checked_keys(path: Path, rows: Sequence[tuple[Any, Any]]) -> list[tuple[str,
 
 
 def lock_of(folder: Path) -> sqlite3.Connection:
-    """Return the lock of a folder: an open transaction on a lock file.
-
-    The operating system ends it with the process.
-    """
-    path = folder / LOCK
-    lock = None
-    try:
-        lock = sqlite3.connect(path, timeout=0.0, isolation_level=None, check_same_thread=False)
-        lock.execute("BEGIN EXCLUSIVE")
-    except (sqlite3.Error, UnicodeDecodeError) as error:
-        if lock is not None:
-            lock.close()
-        if _code(error) == sqlite3.SQLITE_BUSY:
-            raise InputError(f"{folder}: expected to write alone; another process is writing this campaign") from None
-        why = f"{path.name}: {printable(error_summary(error))}"
-        raise InputError(f"{folder}: expected a folder that can be written; {why}") from error
-    return lock
+    """Return the lock of a folder, see `vedette.internal.files.locked`."""
+    busy = f"{folder}: expected to write alone; another process is writing this campaign"
+    return locked(folder / LOCK, busy, f"{folder}: expected a folder that can be written; {LOCK}:")
 
 
 def check_contents(path: Path, rows: Sequence[tuple[str]], *contents: str) -> None:

@@ -105,7 +105,12 @@ def _print_rows(
     gap = 2 if _width(names, numbers, 2) + longest <= console.width else 1
     label_width = console.width - _width(names, numbers, gap)
     if label_width < min(_SHORTEST_LABEL, longest):
-        _print_lines(console, labels, names, numbers)
+        widest = max(map(len, names))
+        for label, row in zip(labels, numbers, strict=True):
+            console.print(label)
+            for heading, number in zip(names, row, strict=True):
+                if number:
+                    console.print(f"  {heading:<{widest}}  {number}")
     else:
         _print_table(console, elided_apart(strategies, min(label_width, _LONGEST_LABEL)), names, numbers, gap)
 
@@ -127,15 +132,3 @@ def _print_table(
     for label, row in zip(labels, numbers, strict=True):
         table.add_row(label, *row)
     console.print(table)
-
-
-def _print_lines(
-    console: Console, labels: tuple[str, ...], names: tuple[str, ...], numbers: list[tuple[str, ...]]
-) -> None:
-    """Print one strategy after the other, with a line for each of its numbers."""
-    widest = max(map(len, names))
-    for label, row in zip(labels, numbers, strict=True):
-        console.print(label)
-        for heading, number in zip(names, row, strict=True):
-            if number:
-                console.print(f"  {heading:<{widest}}  {number}")

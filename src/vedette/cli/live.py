@@ -118,18 +118,23 @@ def live(
 
     Reads one JSON line per scan; writes estimates, and plans when a decision is due.
     """
+    from vedette.live import PersistentLoop
+
     sources = parse_sources(listen or ["stdin"], token)
     options = _LoopOptions(max_delay, max_lead, speed, planner, decide_every, planning_timeout, seed)
     live_scenario = _read_scenario(sensors, options, trust)
     loop = _build_loop(live_scenario, options)
-    identity = _digest(options, loop, sensors)
+    in_use = options if loop.planner else options._replace(planner="")
+    identity = hashlib.sha256(repr(tuple(in_use)).encode() + sensors.read_bytes()).hexdigest()
     screen = None
     if any(source.kind == "ws" for source in sources):
         screen = _open_screen(live_scenario, loop, lambda: persistent.state)
         loop = screen.live
     with interruptible("what came is kept where --snapshot or --record say so"):
         compile_if_cold(live_scenario.scenario)
-        persistent = _open_storage(loop, identity, snapshot, snapshot_interval, record)
+        persistent = PersistentLoop(
+            loop, identity=identity, snapshot=snapshot, snapshot_interval=snapshot_interval, record=record, report=note
+        )
         _process(persistent, screen, sources, token)
     emit_json(_document(persistent))
 
@@ -172,26 +177,10 @@ def _build_loop(live_scenario: LiveScenario, options: _LoopOptions) -> LiveLoop:
     )
 
 
-def _digest(options: _LoopOptions, loop: LiveLoop, sensors: Path) -> str:
-    """Return the identity of a loop: a digest of its options and of the sensors file."""
-    in_use = options if loop.planner else options._replace(planner="")
-    return hashlib.sha256(repr(tuple(in_use)).encode() + sensors.read_bytes()).hexdigest()
-
-
 def _open_screen(live_scenario: LiveScenario, loop: LiveLoop, state: Callable[[], LiveState]) -> LiveScreen:
     from vedette.reports.live import LiveScreen
 
     return LiveScreen(live_scenario.scenario, loop, state)
-
-
-def _open_storage(
-    loop: LiveLoop, identity: str, snapshot: Path | None, interval: float, record: Path | None
-) -> PersistentLoop:
-    from vedette.live import PersistentLoop
-
-    return PersistentLoop(
-        loop, identity=identity, snapshot=snapshot, snapshot_interval=interval, record=record, report=note
-    )
 
 
 def _process(

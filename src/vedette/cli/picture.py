@@ -102,7 +102,10 @@ def _draw_sensors(axes: Axes, scenario: Scenario, truth: Truth, bounds: Floats, 
     for name, sensor, name_place in zip(model.sensor_names, model.sensors, name_places, strict=True):
         place = (sensor.position[0] * scale, sensor.position[1] * scale)
         if sensor.platform.top_speed > 0.0:
-            _draw_heading(axes, place, np.radians(sensor.heading_deg))
+            heading = np.radians(sensor.heading_deg)
+            arrow = {"arrowstyle": "<|-", "color": INK, "linewidth": 0.9, "shrinkA": 0, "shrinkB": 0}
+            start = (14.0 * float(np.cos(heading)), 14.0 * float(np.sin(heading)))
+            axes.annotate("", place, xytext=start, textcoords="offset points", arrowprops=arrow, zorder=4)
         field = bounded_field(sensor)
         if field is not None:
             draw_field(axes, place, field, scale)
@@ -110,12 +113,6 @@ def _draw_sensors(axes: Axes, scenario: Scenario, truth: Truth, bounds: Floats, 
         background = {"boxstyle": "square,pad=0.1", "facecolor": "white", "edgecolor": "none", "alpha": 0.75}
         style: dict[str, Any] = {"textcoords": "offset points", "fontsize": 7, "zorder": 4.5, "bbox": background}
         axes.annotate(drawn_text(name), place, **name_place.arguments, **style)
-
-
-def _draw_heading(axes: Axes, place: tuple[float, float], heading: float) -> None:
-    arrow_start = (14.0 * float(np.cos(heading)), 14.0 * float(np.sin(heading)))
-    arrow = {"arrowstyle": "<|-", "color": INK, "linewidth": 0.9, "shrinkA": 0, "shrinkB": 0}
-    axes.annotate("", place, xytext=arrow_start, textcoords="offset points", arrowprops=arrow, zorder=4)
 
 
 def _legend(scenario: Scenario) -> list[Line2D | Patch]:

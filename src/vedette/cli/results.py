@@ -138,16 +138,10 @@ def print_results(opened: CampaignResults, groups: Sequence[GroupComparison]) ->
     for group in groups:
         if title := opened.title(group):
             echo(f"{title}:")
-        print_comparison(group.comparison, _strategy_descriptions(opened, group))
+        words = tuple(cell.words for cell in group.cells) if opened.campaign.compare == "planner" else ()
+        print_comparison(group.comparison, words)
         echo("")
     print_progress(opened)
-
-
-def _strategy_descriptions(opened: CampaignResults, group: GroupComparison) -> tuple[str, ...]:
-    """Return the description of each strategy of a group; empty if the campaign does not compare planners."""
-    if opened.campaign.compare != "planner":
-        return ()
-    return tuple(cell.words for cell in group.cells)
 
 
 def print_progress(opened: CampaignResults) -> None:

@@ -173,20 +173,14 @@ class DecisionAnalysis:
         unknown = [name for name in columns if name not in own.columns]
         if unknown:
             raise InputError(f"had: expected columns {', '.join(own.columns) or '(none)'}; got {unknown[0]}")
-        requested = [columns.get(name, value) for name, value in zip(own.columns, own.values[chosen], strict=True)]
-        fits = np.flatnonzero(_same(own, np.array(requested, np.float64)))
+        numbers = zip(own.columns, own.values[chosen].tolist(), strict=True)
+        requested = np.array([columns.get(name, value) for name, value in numbers])
+        close = own.differences(requested) <= _SAME_NUMBER * np.maximum(1.0, np.abs(requested))
+        fits = np.flatnonzero(close.all(axis=1))
         if len(fits) == 0:
             request = ", ".join(f"{name} {value:g}" for name, value in columns.items())
             raise InputError(f"had: expected something that sensor {sensor + 1} could do ({_few(own)}); got {request}")
         return int(fits[0])
-
-
-def _same(own: Actions, requested: Floats) -> np.ndarray[Any, np.dtype[np.bool_]]:
-    """Return (num_actions,) whether each action has these numbers, angles modulo full turns."""
-    off = np.abs(own.values - requested)
-    turns = np.array([name.endswith("_deg") for name in own.columns], np.bool_)
-    off = np.where(turns, np.abs(np.remainder(off + 180.0, 360.0) - 180.0), off)
-    return np.asarray((off <= _SAME_NUMBER * np.maximum(1.0, np.abs(requested))).all(axis=1))
 
 
 def _few(own: Actions) -> str:

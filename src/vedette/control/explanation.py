@@ -179,7 +179,12 @@ class Explanation:
         return Explanation(**values)
 
     def __repr__(self) -> str:
-        return text_of(self)
+        lines = [*_of_choice(self), *_of_targets(self), *_of_sensors(self)]
+        reasons: dict[str, list[str]] = {}
+        for name, reason in self.missing.items():
+            reasons.setdefault(reason, []).append(name)
+        lines += [f"no {', '.join(names)}: {reason}" for reason, names in reasons.items()]
+        return "\n".join(part for line in lines for part in _wrapped(line))
 
 
 # Fields that may be None, with a reason.
@@ -192,16 +197,6 @@ def _ratio(difference: float, error: float | None) -> float | None:
     if error == 0.0 or np.isnan(error):
         return math.copysign(math.inf, difference) if difference != 0.0 else 0.0
     return difference / error
-
-
-def text_of(explanation: Explanation) -> str:
-    """Return a text of the reward, the margin to the runner-up, and the ten largest contributions."""
-    lines = [*_of_choice(explanation), *_of_targets(explanation), *_of_sensors(explanation)]
-    reasons: dict[str, list[str]] = {}
-    for name, reason in explanation.missing.items():
-        reasons.setdefault(reason, []).append(name)
-    lines += [f"no {', '.join(names)}: {reason}" for reason, names in reasons.items()]
-    return "\n".join(part for line in lines for part in _wrapped(line))
 
 
 def _wrapped(line: str) -> list[str]:
@@ -236,13 +231,13 @@ def _of_choice(explanation: Explanation) -> list[str]:
     return lines
 
 
-def margin_text(runner_up: RunnerUp, reward: float) -> str:
+def margin_text(runner_up: RunnerUp, reward: float, sign: str = "+-", brackets: tuple[str, str] = (" (", ")")) -> str:
     """Return the margin as text, such as `less by 0.12 +- 0.03 (4 standard errors)`."""
     if abs(runner_up.margin) <= _SAME * max(1.0, abs(reward)):
         return "as good"
     ratio = runner_up.in_standard_errors
-    apart = "" if ratio is None or np.isinf(ratio) else f" ({ratio:.2g} standard errors)"
-    return f"less by {with_error(runner_up.margin, runner_up.standard_error)}{apart}"
+    apart = "" if ratio is None or np.isinf(ratio) else f"{ratio:.2g} standard errors".join(brackets)
+    return f"less by {with_error(runner_up.margin, runner_up.standard_error, sign)}{apart}"
 
 
 def _of_targets(explanation: Explanation) -> list[str]:

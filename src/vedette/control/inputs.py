@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from vedette.control.constraints import Active, Constraint, ConstraintContext, Mask, feasible_action_mask
+from vedette.control.constraints import Constraint, ConstraintContext, Mask, feasible_action_mask
 from vedette.control.prediction import predicted
 from vedette.control.rewards.base import LabelReward, PowerReward
 from vedette.control.rewards.power import ExpectedLossReward
@@ -190,12 +190,9 @@ def stationary_courses(options: Sequence[Options], mask: Mask | None) -> tuple[i
             means = change.mean(axis=1)[candidates]
             candidates = candidates[means <= means.min() + _SAME_CHANGE * max(1.0, means.max())]
         stationary.append(int(candidates[0]))
-    return tuple(stationary) if mask is None or mask.active is None else _silent(stationary, mask.active)
-
-
-def _silent(joint: Sequence[int], active: Active) -> tuple[int, ...]:
-    """Return the same courses without scans, for sensors that can be switched off."""
-    return tuple(int(off[course]) for course, off in zip(joint, active.off, strict=True))
+    if mask is None or mask.active is None:
+        return tuple(stationary)
+    return tuple(int(off[course]) for course, off in zip(stationary, mask.active.off, strict=True))
 
 
 def compiled_mask(mask: Mask | None, shape: Sequence[int]) -> Allowed | None:

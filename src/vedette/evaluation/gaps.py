@@ -170,19 +170,14 @@ def _estimate_information(
 ) -> Iterator[_Information]:
     """Yield the information in the scans of each of the first estimates; prior: of births, before the first."""
     scans = (history.steps[:_FIRST_ESTIMATES] - 1).tolist()
-    fits = prior.log_weights + _log_densities(prior, history.means[0], history.covs[0])
-    nearest = taken_components(prior, np.array([int(np.argmax(fits))]))
+    covs, offsets = prior.covs + history.covs[0], prior.means - history.means[0]
+    squared = (offsets * np.linalg.solve(covs, offsets[..., np.newaxis])[..., 0]).sum(axis=-1)
+    log_fits = prior.log_weights - 0.5 * (squared + np.linalg.slogdet(covs)[1])  # up to a constant
+    nearest = taken_components(prior, np.array([int(np.argmax(log_fits))]))
     yield _information(scans[0], nearest, history.means[0], history.covs[0])
     for k, (last, now) in enumerate(pairwise(scans)):
         posterior = components_of(np.zeros(1), history.means[k : k + 1].copy(), history.covs[k : k + 1].copy())
         yield _information(now, observations.predict(posterior, last, now), history.means[k + 1], history.covs[k + 1])
-
-
-def _log_densities(mixture: Mixture, mean: Floats, cov: Floats) -> Floats:
-    """Return the log integrals of N(x; mean, cov) times each unweighted component, (num,), up to a constant."""
-    covariances, offsets = mixture.covs + cov, mixture.means - mean
-    squared = (offsets * np.linalg.solve(covariances, offsets[..., np.newaxis])[..., 0]).sum(axis=-1)
-    return np.asarray(-0.5 * (squared + np.linalg.slogdet(covariances)[1]))
 
 
 def _information(scan: int, prior: Mixture, mean: Floats, cov: Floats) -> _Information:

@@ -187,14 +187,7 @@ def _have_equal_actions(actions: Sequence[tuple[Actions, ...]]) -> bool:
     return all(
         other.columns == first.columns
         and len(other) == len(first)
-        and (np.array_equal(other.values, first.values) or _largest_difference(other, first) < _TOLERANCE)
+        and (np.array_equal(other.values, first.values) or (other.differences(first.values) < _TOLERANCE).all())
         for run in actions
         for other, first in zip(run, actions[0], strict=True)
     )
-
-
-def _largest_difference(other: Actions, first: Actions) -> float:
-    differences = np.abs(other.values - first.values)
-    angles = [name.endswith("_deg") for name in other.columns]
-    differences[:, angles] = np.abs(np.remainder(differences[:, angles] + 180.0, 360.0) - 180.0)
-    return float(differences.max(initial=0.0))

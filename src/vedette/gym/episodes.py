@@ -206,6 +206,29 @@ class Episodes:
         return found if isinstance(found, BuiltScenario) else BuiltScenario(found, self._num_labels)
 
 
+class OfEpisodes:
+    """Members of all environments."""
+
+    episodes: Episodes
+
+    @property
+    def world(self) -> SimulationRun:
+        """The current run, with its truth."""
+        return self.episodes.world
+
+    def record(self) -> RunRecord:
+        """Return the record of the current run so far, as in a campaign."""
+        return self.episodes.record()
+
+    def render(self) -> NDArray[np.uint8] | None:
+        """Return the last scan as a frame of `vedette video`, (height, width, 3) for "rgb_array", or show it."""
+        return self.episodes.render()
+
+    def close(self) -> None:
+        """Close the window."""
+        self.episodes.close()
+
+
 def _scenario_sampler(
     scenario: AnyScenario | Sequence[AnyScenario], num_labels: int
 ) -> Callable[[np.random.Generator], BuiltScenario]:

@@ -7,19 +7,17 @@ from typing import Any, ClassVar, Literal
 
 import numpy as np
 from gymnasium import spaces
-from numpy.typing import NDArray
 from pettingzoo import ParallelEnv
 
-from vedette.gym.episodes import RENDER_MODES, AnyReward, Episodes, Scenarios
+from vedette.gym.episodes import RENDER_MODES, AnyReward, Episodes, OfEpisodes, Scenarios
 from vedette.gym.observing import Observation, belief_arrays
 from vedette.gym.spaces import space_of
 from vedette.models.arguments import one_of, reject
-from vedette.simulation import RunRecord, SimulationRun
 
 _BELIEF = ("existence", "means", "sqrt_covs", "mask")
 
 
-class ScenarioParallelEnv(ParallelEnv):  # type: ignore[misc]  # PettingZoo is untyped
+class ScenarioParallelEnv(OfEpisodes, ParallelEnv):  # type: ignore[misc]  # PettingZoo is untyped
     """A scenario from decision to decision.
 
     Each sensor that has a choice is an agent, and all agents get the same reward.
@@ -65,15 +63,6 @@ class ScenarioParallelEnv(ParallelEnv):  # type: ignore[misc]  # PettingZoo is u
         """Return the action space of an agent: the indices of its sensor's actions."""
         return self._action_spaces[agent]
 
-    @property
-    def world(self) -> SimulationRun:
-        """The current run, with its truth."""
-        return self.episodes.world
-
-    def record(self) -> RunRecord:
-        """Return the record of the current run so far, as in a campaign."""
-        return self.episodes.record()
-
     def reset(
         self, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[dict[str, Observation], dict[str, dict[str, Any]]]:
@@ -113,11 +102,3 @@ class ScenarioParallelEnv(ParallelEnv):  # type: ignore[misc]  # PettingZoo is u
 
     def _all(self, make: Callable[[], dict[str, Any]]) -> dict[str, dict[str, Any]]:
         return {agent: make() for agent in self._sensors}
-
-    def render(self) -> NDArray[np.uint8] | None:
-        """Return the result of `ScenarioEnv.render`."""
-        return self.episodes.render()
-
-    def close(self) -> None:
-        """Close the window."""
-        self.episodes.close()

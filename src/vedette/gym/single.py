@@ -9,13 +9,12 @@ import numpy as np
 from gymnasium import spaces
 from numpy.typing import NDArray
 
-from vedette.gym.episodes import RENDER_MODES, AnyReward, Episodes, Scenarios
+from vedette.gym.episodes import RENDER_MODES, AnyReward, Episodes, OfEpisodes, Scenarios
 from vedette.gym.observing import Observation
 from vedette.gym.spaces import space_of
-from vedette.simulation import RunRecord, SimulationRun
 
 
-class ScenarioEnv(gymnasium.Env[dict[str, Any], Any]):
+class ScenarioEnv(OfEpisodes, gymnasium.Env[dict[str, Any], Any]):
     """A scenario from decision to decision; one agent chooses the actions of all sensors that have a choice.
 
     A step applies the actions and takes the scans up to and including the one before the next decision, or the last one
@@ -54,15 +53,6 @@ class ScenarioEnv(gymnasium.Env[dict[str, Any], Any]):
         sizes = self.episodes.layout.num_actions
         self.action_space = spaces.Discrete(sizes[0]) if len(sizes) == 1 else spaces.MultiDiscrete(list(sizes))
 
-    @property
-    def world(self) -> SimulationRun:
-        """The current run, with its truth."""
-        return self.episodes.world
-
-    def record(self) -> RunRecord:
-        """Return the record of the current run so far, as in a campaign."""
-        return self.episodes.record()
-
     def action_masks(self) -> NDArray[np.bool_]:
         """Mask of the allowed actions of all sensors, concatenated, shape (sum of numbers of actions,)."""
         mask = self.episodes.context.observation["action_mask"].astype(np.bool_)
@@ -87,11 +77,3 @@ class ScenarioEnv(gymnasium.Env[dict[str, Any], Any]):
         self.episodes.decide(action)
         episodes = self.episodes
         return episodes.context.observation, episodes.reward(), False, episodes.is_over, episodes.info()
-
-    def render(self) -> NDArray[np.uint8] | None:
-        """Return the last scan as a frame of `vedette video`, (height, width, 3) for "rgb_array", or show it."""
-        return self.episodes.render()
-
-    def close(self) -> None:
-        """Close the window."""
-        self.episodes.close()

@@ -28,12 +28,11 @@ def cut_share(num_labels: float, probability: float, max_sets: int) -> float:
     if n == 0 or probability >= 0.5:
         return 0.0
     remaining, total, births = float(max_sets), 0.0, 0.0
+    odds = probability / (1.0 - probability)
     for k in range(min(n, math.ceil(expected + 10.0 * math.sqrt(expected) + 20.0)) + 1):
         log_sets = math.lgamma(n + 1) - math.lgamma(k + 1) - math.lgamma(n - k + 1)
         num_sets = min(math.exp(min(log_sets, 700.0)), remaining)
-        weight = num_sets * math.exp(
-            k * math.log(probability / (1.0 - probability))
-        )  # relative to the set without births
+        weight = num_sets * math.exp(k * math.log(odds))  # relative to the set without births
         remaining, total, births = remaining - num_sets, total + weight, births + k * weight
         if remaining <= 0.5:
             break

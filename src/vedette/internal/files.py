@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import BinaryIO
 
 from vedette.errors import InputError
+from vedette.internal.text import printable
 
 
 def write_whole(target: Path, write: Callable[[BinaryIO], object]) -> None:
@@ -68,14 +69,25 @@ def lock_beside(path: Path) -> sqlite3.Connection:
 
     The lock ends with the process. Raises `InputError` if another process holds it, or the folder cannot be written.
     """
+    busy = f"{path}: expected to write alone; another process is writing it"
+    return locked(
+        path.with_name(f"{path.name}.lock"), busy, f"{path}: expected a file in a folder that can be written;"
+    )
+
+
+def locked(path: Path, busy: str, failed: str) -> sqlite3.Connection:
+    """Return an open transaction on a lock file, which the operating system ends with the process.
+
+    Raises `InputError` with the text `busy` if another process holds it, else with `failed` and the reason.
+    """
     lock = None
     try:
-        lock = sqlite3.connect(path.with_name(f"{path.name}.lock"), timeout=0.0, isolation_level=None)
+        lock = sqlite3.connect(path, timeout=0.0, isolation_level=None, check_same_thread=False)
         lock.execute("BEGIN EXCLUSIVE")
-    except sqlite3.Error as error:
+    except (sqlite3.Error, UnicodeDecodeError) as error:
         if lock is not None:
             lock.close()
         if getattr(error, "sqlite_errorcode", 0) & 0xFF == sqlite3.SQLITE_BUSY:
-            raise InputError(f"{path}: expected to write alone; another process is writing it") from None
-        raise InputError(f"{path}: expected a file in a folder that can be written; {error}") from error
+            raise InputError(busy) from None
+        raise InputError(f"{failed} {printable(str(error))}") from error
     return lock

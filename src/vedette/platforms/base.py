@@ -138,6 +138,13 @@ class Actions(SummaryRepr):
     def _summary(self) -> str:
         return f"of {pluralise(len(self), 'choice')}: {', '.join(self.columns)}"
 
+    def differences(self, values: Floats) -> Floats:
+        """Return absolute differences from other values, (num_actions, num_columns), of angles modulo full turns."""
+        off = np.abs(self.values - values)
+        turns = [name.endswith("_deg") for name in self.columns]
+        off[:, turns] = np.abs(np.remainder(off[:, turns] + 180.0, 360.0) - 180.0)
+        return np.asarray(off)
+
     def text(self, index: int) -> str:
         """Return one action as text, such as `heading_deg 30, speed 5`.
 

@@ -110,7 +110,7 @@ class _Rows(ScanColumns):
     def _row(self, i: int) -> _Row:
         s = self._site(i)
         time, pose = self._seconds(i), self._pose(i, s)
-        accuracy = self._own_accuracy(i, s)
+        accuracy = {name: self._accuracy_value(i, s, name) for name in self.accuracy[s] or ()}
         return _Row(i, time, s, self._measured(i, s, pose, accuracy), pose, tuple(accuracy.values()))
 
     def _site(self, i: int) -> int:
@@ -184,10 +184,6 @@ class _Rows(ScanColumns):
     def _third(self, i: int, quantity: str) -> float:
         """Return a measured value; of a third component that the row does not have, what stands in for it."""
         return GAPS[quantity] if quantity in GAPS and self._is_blank(i, quantity) else self._value(i, quantity)
-
-    def _own_accuracy(self, i: int, s: int) -> dict[str, float]:
-        """Return the values of a row's columns of accuracy, NaN for empty cells."""
-        return {name: self._accuracy_value(i, s, name) for name in self.accuracy[s] or ()}
 
     def _accuracy_value(self, i: int, s: int, name: str) -> float:
         if self._is_blank(i, name):

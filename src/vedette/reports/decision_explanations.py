@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from vedette.control.explanation import Explanation, RunnerUp, TargetGains, number_text, with_error
+from vedette.control.explanation import Explanation, RunnerUp, TargetGains, margin_text, number_text, with_error
 from vedette.control.plan import Plan
 from vedette.evaluation.actions import describe_action, rounded
 from vedette.internal.text import pluralise
@@ -43,9 +43,8 @@ def _facts(plan: Plan, explanation: Explanation, reward: float, names: Sequence[
     start = "" if explanation.baseline is None else f"; {number_text(explanation.baseline, reward)} without any scan"
     facts = [("Reward", f"{with_error(reward, explanation.standard_error, '±')}{start}")]
     if explanation.runner_up is not None:
-        facts.append(
-            ("Second best", f"{_margin(explanation.runner_up, reward)}: {_others(plan, explanation.runner_up, names)}")
-        )
+        margin = margin_text(explanation.runner_up, reward, "±", (", ", ""))
+        facts.append(("Second best", f"{margin}: {_others(plan, explanation.runner_up, names)}"))
     facts.append(("Evaluated", pluralise(explanation.evaluations, "choice")))
     if explanation.bound is not None:
         facts.append(("Bound", str(explanation.bound)))
@@ -54,14 +53,6 @@ def _facts(plan: Plan, explanation: Explanation, reward: float, names: Sequence[
         if name in _WORDS:
             reasons.setdefault(reason, []).append(_WORDS[name])
     return facts + [("Not known", f"{', '.join(names)}: {reason}") for reason, names in reasons.items()]
-
-
-def _margin(runner_up: RunnerUp, reward: float) -> str:
-    if abs(runner_up.margin) <= _SAME * max(1.0, abs(reward)):
-        return "as good"
-    ratio = runner_up.in_standard_errors
-    standard_errors = "" if ratio is None or math.isinf(ratio) else f", {ratio:.2g} standard errors"
-    return f"less by {with_error(runner_up.margin, runner_up.standard_error, '±')}{standard_errors}"
 
 
 def _others(plan: Plan, runner_up: RunnerUp, names: Sequence[str]) -> str:

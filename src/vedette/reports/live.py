@@ -119,7 +119,7 @@ class LiveScreen:
         """Return the present state as JSON."""
         state = self._state()
         timeline = state.timeline
-        belief, poses = timeline.state, timeline.poses
+        belief, poses, newest = timeline.state, timeline.poses, timeline.newest or 0.0
         time = None if state.start is None or belief.time is None else belief.time + state.start
         estimates = None if time is None else self.live.estimate(belief.fused, belief.step)
         extent = self._extent(poses[:, :2], np.empty((0, 2)) if estimates is None else estimates.means[:, :2])
@@ -137,7 +137,8 @@ class LiveScreen:
             "scans": self._scans(timeline, decimals),
             "decision": self._decision_data(poses),
             "health": self._health(timeline),
-            "silence": self._silence(state),
+            # Time since the latest scan of each sensor, s, by the clock of the scans; None before its first.
+            "silence": [None if math.isinf(last) else round(newest - last, 3) for last in state.latest],
             "fault": self._fault,
             "counts": {
                 "lines": state.num_lines,
@@ -201,8 +202,3 @@ class LiveScreen:
             of_targets = new_target_diagnostics(self._new_targets, health, len(set().union(*self._labels)))
             results += tuple(each for each in of_targets if each.level == "check")
         return diagnostics_line(results)
-
-    def _silence(self, state: LiveState) -> list[float | None]:
-        """Return the time since the latest scan of each sensor, s, by the clock of the scans; None before its first."""
-        newest = state.timeline.newest or 0.0
-        return [None if math.isinf(last) else round(newest - last, 3) for last in state.latest]

@@ -89,14 +89,10 @@ def versions_table(manifest: Mapping[str, Any]) -> Table:
             columns.append(([], facts))
         columns[-1][0].append(str(session.get("started", "")))
     names = list(dict.fromkeys(name for _, facts in columns for name in facts))
-    rows = [("started", *(_span(starts) for starts, _ in columns))]
+    rows = [("started", *(starts[0] if len(starts) == 1 else f"{starts[0]} to {starts[-1]}" for starts, _ in columns))]
     rows += [(name, *(facts.get(name, "\N{EN DASH}") for _, facts in columns)) for name in names]
     caption = f"Made {manifest.get('created', '')}; digest of specification and scenarios {manifest.get('digest', '')}."
     return Table(caption, ("", *_headings([len(starts) for starts, _ in columns])), tuple(rows), is_words=True)
-
-
-def _span(starts: list[str]) -> str:
-    return starts[0] if len(starts) == 1 else f"{starts[0]} to {starts[-1]}"
 
 
 def _headings(lengths: list[int]) -> list[str]:

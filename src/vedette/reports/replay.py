@@ -48,6 +48,7 @@ def replay_data(strategy: Strategy, record: RunRecord, group: str, *, trust: boo
     has_velocity = scenario.model.motion.kind != "custom"
     is_known, origin = scenario.model.targets.kind != "unknown", scenario.model.origin
     metadata = recording_metadata(record, scenario)
+    errors = record.ospa[strategy.counted[: record.num_scans], 0]
     axes = dict[str, dict[str, Any]]()
     decisions = [decision_data(decision, axes, names) for decision in record.decisions]
     return {
@@ -55,7 +56,7 @@ def replay_data(strategy: Strategy, record: RunRecord, group: str, *, trust: boo
         "group": group,
         "strategy": strategy.name,
         "words": strategy.words,
-        "mean": _mean_error(strategy, record) if is_known else None,
+        "mean": round(float(errors.mean()), 2) if is_known and len(errors) else None,
         "run": record.run,
         "labelled": strategy.has_labels,
         "extent": rounded_list(extent, decimals),
@@ -83,12 +84,6 @@ def replay_data(strategy: Strategy, record: RunRecord, group: str, *, trust: boo
         "reward": scene.reward,
         "decisions": decisions,
     }
-
-
-def _mean_error(strategy: Strategy, record: RunRecord) -> float | None:
-    """Return the mean OSPA of a run over the counted scans."""
-    counted = strategy.counted[: record.num_scans]
-    return round(float(record.ospa[counted, 0].mean()), 2) if counted.any() else None
 
 
 def rounded_list(values: Any, decimals: int) -> list[float]:

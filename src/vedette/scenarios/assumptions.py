@@ -32,7 +32,9 @@ def assumed_sections(
     descriptions: dict[str, str],
 ) -> dict[str, Any]:
     """Return the sections that are not given, from the scans; adds to `descriptions` a description of each."""
-    assumed: dict[str, Any] = {"time": _time(recording)}
+    times = recording.times
+    period = float(np.median(np.diff(times))) if len(times) > 1 else 1.0
+    assumed: dict[str, Any] = {"time": {"num_steps": len(times), "step_period": period, "start": float(times[0])}}
     if "region" not in given:
         assumed["region"] = region = measured_region(model, recording)
         descriptions["region"] = f"{describe_region(region)} (box around all measurements and sensors)"
@@ -97,13 +99,6 @@ def assumed_birth(
         f"(std {std:.3g} m, {speed:g} m/s)"
     )
     return {"birth": measured_birth(std, speed, model.motion.state_dim, model.has_heights)}
-
-
-def _time(recording: RecordedScans) -> dict[str, Any]:
-    """Return a regular time section that matches the times of the recording as closely as possible."""
-    gaps = np.diff(recording.times)
-    period = float(np.median(gaps)) if len(gaps) else 1.0
-    return {"num_steps": len(recording.times), "step_period": period, "start": float(recording.times[0])}
 
 
 def _place_std(model: ScenarioModel, measured: Sequence[Sequence[Floats]], folder: FilePath) -> float:

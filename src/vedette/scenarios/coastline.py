@@ -60,7 +60,10 @@ def _read(
     lines = [part for line in raw_lines for part in _in_plane(_degrees(line, name), origin)]
     lines = [part for line in lines for part in _retained_parts(line, _meets_box(line, low, high))]
     spacing = _MIN_SPACING * float((high - low).max())
-    while sum(map(len, lines := [_thin(line, spacing) for line in lines if _size(line) >= spacing])) > _MAX_POINTS:
+    while (
+        sum(map(len, lines := [_thin(line, spacing) for line in lines if np.ptp(line, axis=0).max() >= spacing]))
+        > _MAX_POINTS
+    ):
         spacing *= 2.0
     return tuple(tuple(map(tuple, line.tolist())) for line in lines)
 
@@ -108,10 +111,6 @@ def _retained_parts(points: Floats, retained: Bools) -> Iterator[Floats]:
     edges = np.flatnonzero(np.diff(np.concatenate([[False], retained, [False]]).astype(np.int8)))
     for first, end in zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True):
         yield points[first : end + 1]
-
-
-def _size(line: Floats) -> float:
-    return float((line.max(axis=0) - line.min(axis=0)).max())
 
 
 def _thin(line: Floats, spacing: float) -> Floats:

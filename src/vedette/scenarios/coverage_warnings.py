@@ -22,7 +22,11 @@ def coverage_warnings(model: ScenarioModel) -> Iterator[tuple[Path, str]]:
         return
     for s, (sensor, own) in enumerate(zip(model.sensors, views, strict=True)):
         others = [(model.sensors[t], views[t]) for t in range(len(views)) if t != s]
-        if own is None or _may_move(sensor) or any(_views_overlap(sensor, own, *other) for other in others):
+        if (
+            own is None
+            or sensor.platform.top_speed > 0.0
+            or any(_views_overlap(sensor, own, *other) for other in others)
+        ):
             continue
         names = model.sensor_names
         subject = f"{names[s]} and the other sensors" if len(names) > 2 else f"{names[0]} and {names[1]}"
@@ -35,13 +39,9 @@ def coverage_warnings(model: ScenarioModel) -> Iterator[tuple[Path, str]]:
             return
 
 
-def _may_move(sensor: Sensor) -> bool:
-    return sensor.platform.top_speed > 0.0
-
-
 def _views_overlap(first: Sensor, first_view: FieldOfView, second: Sensor, second_view: FieldOfView | None) -> bool:
     """Return True if two sensors see a common place from their start, or if the other one moves or has no edge."""
-    if second_view is None or _may_move(second):
+    if second_view is None or second.platform.top_speed > 0.0:
         return True
     shares = np.linspace(0.0, 1.0, _POINTS_PER_SIDE)
     radii, angles = np.meshgrid(

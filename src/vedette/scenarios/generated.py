@@ -24,6 +24,12 @@ _PLASTIC = 1.3247179572447460
 _STRIDE = (1.0 / _PLASTIC, 1.0 / _PLASTIC**2)
 
 
+def check_whole(name: str, value: object, least: int, most: int) -> None:
+    """Raise `InputError` unless a value is a whole number within bounds."""
+    if isinstance(value, bool) or not isinstance(value, int) or not least <= value <= most:
+        raise InputError(f"{name}: expected a whole number from {least} to {most}; got {value!r}")
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class GeneratedScene:
     """Settings of a generated scene; equal settings give the same file.
@@ -64,11 +70,8 @@ class GeneratedScene:
             "seed": (0, 2**63),
         }
         for name, (least, most) in bounds.items():
-            value = getattr(self, name)
-            if name == "num_targets" and value is None:
-                continue
-            if isinstance(value, bool) or not isinstance(value, int) or not least <= value <= most:
-                raise InputError(f"{name}: expected a whole number from {least} to {most}; got {value!r}")
+            if name != "num_targets" or self.num_targets is not None:
+                check_whole(name, getattr(self, name), least, most)
 
     @property
     def total_targets(self) -> int:

@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Any
 
 from vedette.errors import InputError
-from vedette.scenarios.generated import WORLD
+from vedette.scenarios.generated import WORLD, check_whole
 
 MEASURED = ("position", "bearing_range")
 MAX_TARGETS = 100_000
@@ -44,8 +43,8 @@ class GeneratedCrowd:
     def __post_init__(self) -> None:
         if self.measured not in MEASURED:
             raise InputError(f"measured: expected one of {', '.join(MEASURED)}; got {self.measured!r}")
-        _check_count("num_targets", self.num_targets, MAX_TARGETS)
-        _check_count("num_steps", self.num_steps, 10_000)
+        check_whole("num_targets", self.num_targets, 1, MAX_TARGETS)
+        check_whole("num_steps", self.num_steps, 1, 10_000)
         for name, (least, most) in (("density", DENSITIES), ("clutter", (0.0, 100.0))):
             value = getattr(self, name)
             if isinstance(value, bool) or not isinstance(value, int | float) or not least <= value <= most:
@@ -65,11 +64,6 @@ class GeneratedCrowd:
         parts += [] if self.measured == default.measured else ["bearing-range"]
         parts += [] if self.num_steps == default.num_steps else [f"steps-{self.num_steps}"]
         return "-".join(parts)
-
-
-def _check_count(name: str, value: Any, largest: int) -> None:
-    if isinstance(value, bool) or not isinstance(value, int) or not 1 <= value <= largest:
-        raise InputError(f"{name}: expected a whole number from 1 to {largest}; got {value!r}")
 
 
 _STD = 5.0  # m, standard deviation of a measurement

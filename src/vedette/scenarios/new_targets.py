@@ -121,12 +121,11 @@ def new_targets(scenario: Scenario, num_scans: int | None = None) -> NewTargets 
     has_one_belief = model.fusion.kind in (*SINGLE_BELIEF_FUSIONS, *FULL_INFORMATION_FUSIONS)
     ends, rows = scan * np.arange(num, 0, -1), []
     for source in (each for each in _sources(model, nodes, num) if each.steps.any()):
-        views = views_of(source.mean)
+        views, options = views_of(source.mean), []
         death = (1.0 - plain(survival.function)(source.mean, scan, survival.params)) / scan
         speed = 0.0 if is_moving else math.hypot(*source.mean[2:4], *np.sqrt(np.diag(source.cov)[2:4]))
         lasts = min(1.0 / death if death else math.inf, width / speed if speed else math.inf)
-        options = []
-        for group in ([views] if has_one_belief else [[view] for view in views]) if views else ():
+        for group in filter(None, [views] if has_one_belief else [[view] for view in views]):
             rate = sum(view.rate for view in group)
             needed = _needed(model, motion, source, group, rate + death)
             options.append((needed / rate, needed, rate))
@@ -219,6 +218,6 @@ def plain(function: Any) -> Any:
     source = getattr(function, "py_func", None)
     if source is None:
         return function
-    known = {name: source.__globals__.get(name) for name in source.__code__.co_names}
-    compiled = {name: plain(value) for name, value in known.items() if hasattr(value, "py_func")}
+    known = ((name, source.__globals__.get(name)) for name in source.__code__.co_names)
+    compiled = {name: plain(value) for name, value in known if hasattr(value, "py_func")}
     return FunctionType(source.__code__, {**source.__globals__, **compiled}, source.__name__)

@@ -281,7 +281,8 @@ def _different_views(scenario: Scenario) -> Iterator[tuple[Path, str]]:
     if difference[worst] > MAX_DIFFERENCE:
         yield (
             ("sensors", list(detection)[int(table[:, worst].argmin())], "detection"),
-            _describe_difference(names, table, grid, fusion) + suggest_fusions(scenario, fusion, by_views=True),
+            _describe_difference(names, table, difference, grid, fusion)
+            + suggest_fusions(scenario, fusion, by_views=True),
         )
     elif model.decision_steps:
         yield from _limited_and_moving(scenario, fusion)
@@ -291,9 +292,8 @@ def _rule_name(fusion: Fusion) -> str:
     return "the arithmetic average" if fusion.kind == "arithmetic_average" else "GCI"
 
 
-def _describe_difference(names: list[str], table: Floats, grid: Floats, fusion: Fusion) -> str:
+def _describe_difference(names: list[str], table: Floats, difference: Floats, grid: Floats, fusion: Fusion) -> str:
     """Describe how much the probabilities of detection differ, and where most; table: (num_sensors, num_places)."""
-    difference = table.max(axis=0) - table.min(axis=0)
     worst = int(difference.argmax())
     probabilities = ", ".join(
         f"{name} {probability:.2g}" for name, probability in zip(names, table[:, worst], strict=True)

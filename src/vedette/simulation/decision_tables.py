@@ -20,35 +20,20 @@ from vedette.simulation.records import Decision
 
 DECISION = {"decision": Kind.INTEGER, "step": Kind.INTEGER, "time_s": Kind.NUMBER}
 
+_REWARD = {"reward": Kind.NUMBER, "reward_se": Kind.NUMBER, "chosen": Kind.TRUTH}
+
 DECISION_TABLES: dict[str, Layout] = {
     "decisions": Layout({**DECISION, "planner": Kind.TEXT, "notes": Kind.TEXT}, {"num_": Kind.COUNT}),
     "actions": Layout(
         {**DECISION, "sensor": Kind.INTEGER, "action": Kind.INTEGER, "chosen": Kind.TRUTH}, {"": Kind.VALUE}
     ),
-    "rewards": Layout(
-        {
-            **DECISION,
-            "reward_table": Kind.INTEGER,
-            "reward": Kind.NUMBER,
-            "reward_se": Kind.NUMBER,
-            "chosen": Kind.TRUTH,
-        },
-        {"action_": Kind.COUNT},
-    ),
+    "rewards": Layout({**DECISION, "reward_table": Kind.INTEGER, **_REWARD}, {"action_": Kind.COUNT}),
 }
 # Additional table for runs of many sensors: rewards of the actions of a single sensor. In `rewards` each row would have
 # a column for every other sensor.
 OWN_REWARDS: dict[str, Layout] = {
     "own_rewards": Layout(
-        {
-            **DECISION,
-            "reward_table": Kind.INTEGER,
-            "sensor": Kind.INTEGER,
-            "action": Kind.INTEGER,
-            "reward": Kind.NUMBER,
-            "reward_se": Kind.NUMBER,
-            "chosen": Kind.TRUTH,
-        }
+        {**DECISION, "reward_table": Kind.INTEGER, "sensor": Kind.INTEGER, "action": Kind.INTEGER, **_REWARD}
     )
 }
 _FEW_SENSORS = 16  # up to this number of sensors, all rewards are in `rewards`
@@ -72,7 +57,7 @@ def decision_tables(decisions: Sequence[Decision], num_sensors: int) -> dict[str
             **decision_columns(number, decision),
             "planner": decision.plan.planner,
             "notes": _notes(decision.plan),
-            **_counts(decision.plan),
+            **{f"num_{name}": count for name, count in decision.plan.counts.items()},
         }
         for number, decision in enumerate(decisions)
     ]
@@ -87,8 +72,7 @@ def decision_tables(decisions: Sequence[Decision], num_sensors: int) -> dict[str
             else:
                 (sensor,) = table.sensors
                 own_rows.append({"sensor": sensor, "action": rows.pop(f"action_{sensor}"), **rows})
-    start, end = (*DECISION, "reward_table"), ("reward", "reward_se", "chosen")
-    names = (*start, *(f"action_{sensor}" for sensor in range(num_sensors)), *end)
+    names = (*DECISION, "reward_table", *(f"action_{sensor}" for sensor in range(num_sensors)), *_REWARD)
     columns = {
         "decisions": stacked(of_decisions, DECISION_TABLES["decisions"]),
         "actions": _actions(decisions),
@@ -96,10 +80,6 @@ def decision_tables(decisions: Sequence[Decision], num_sensors: int) -> dict[str
     }
     layout = OWN_REWARDS["own_rewards"]
     return {**columns, "own_rewards": stacked(own_rows, layout, list(layout.fixed))} if own_rows else columns
-
-
-def _counts(plan: Plan) -> dict[str, int]:
-    return {f"num_{name}": count for name, count in plan.counts.items()}
 
 
 def _evaluated(table: RewardTable, plan: Plan) -> dict[str, Any]:

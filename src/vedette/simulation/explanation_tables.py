@@ -22,10 +22,7 @@ EXPLANATION_TABLES: dict[str, Layout] = {
     "explanations": Layout(
         {
             **DECISION,
-            "reward": Kind.VALUE,
-            "reward_se": Kind.VALUE,
-            "baseline": Kind.VALUE,
-            "undetected_gain": Kind.VALUE,
+            **dict.fromkeys(("reward", "reward_se", "baseline", "undetected_gain"), Kind.VALUE),
             "evaluations": Kind.INTEGER,
             "bound": Kind.VALUE,
             "bound_kind": Kind.TEXT,
@@ -40,10 +37,8 @@ EXPLANATION_TABLES: dict[str, Layout] = {
     "target_gains": Layout(
         {
             **DECISION,
-            "birth_step": Kind.INTEGER,
-            "birth_site": Kind.INTEGER,
-            "existence_gain": Kind.NUMBER,
-            "localisation_gain": Kind.NUMBER,
+            **dict.fromkeys(("birth_step", "birth_site"), Kind.INTEGER),
+            **dict.fromkeys(("existence_gain", "localisation_gain"), Kind.NUMBER),
         }
     ),
     "sensor_gains": Layout(
@@ -64,9 +59,8 @@ def explanation_tables(decisions: Sequence[Decision], num_sensors: int) -> dict[
             values = getattr(explanation, name)
             if values is not None and np.shape(values) != (num_sensors,):
                 raise InputError(f"plan.explanation.{name}: expected {num_sensors} numbers; got {np.shape(values)}")
-    priced = (
-        ("price",) if any(explanation.price for _, _, explanation in stored) else ()
-    )  # only in runs whose actions have prices
+    # Only in runs whose actions have prices.
+    priced = ("price",) if any(explanation.price for _, _, explanation in stored) else ()
     names = [*EXPLANATION_TABLES["explanations"].fixed, *priced, *(f"action_{sensor}" for sensor in range(num_sensors))]
     parts: dict[str, list[dict[str, Any]]] = {name: [] for name in EXPLANATION_TABLES}
     for number, decision, explanation in stored:
@@ -150,6 +144,10 @@ def _explanation(
     if len(sensors["sensor"]) not in (0, plan.num_sensors):
         raise InputError(f"sensor_gains: expected rows of {plan.num_sensors} sensors; got {len(sensors['sensor'])}")
     has_sensors = len(sensors["sensor"]) > 0
+    gains = None
+    if "of_targets" not in missing:
+        labels = np.stack([targets["birth_step"], targets["birth_site"]], axis=1)
+        gains = TargetGains(labels, targets["existence_gain"], targets["localisation_gain"])
     return Explanation(
         planner=plan.planner,
         chosen=tuple(actions.text(index) for actions, index in zip(plan.actions, plan.chosen, strict=True)),
@@ -157,7 +155,7 @@ def _explanation(
         standard_error=_number(table["reward_se"][row]),
         evaluations=int(table["evaluations"][row]),
         baseline=_number(table["baseline"][row]),
-        of_targets=None if "of_targets" in missing else _gains(targets),
+        of_targets=gains,
         of_undetected=_number(table["undetected_gain"][row]),
         of_sensors=sensors["gain"] if has_sensors else None,
         reward_without_sensor=sensors["reward_without_sensor"] if has_sensors else None,
@@ -166,11 +164,6 @@ def _explanation(
         missing=missing,
         price=float(table["price"][row]) if "price" in table else 0.0,
     )
-
-
-def _gains(targets: Mapping[str, Any]) -> TargetGains:
-    labels = np.stack([targets["birth_step"], targets["birth_site"]], axis=1)
-    return TargetGains(labels, targets["existence_gain"], targets["localisation_gain"])
 
 
 def _runner_up(plan: Plan, table: Mapping[str, Any], row: int) -> RunnerUp:

@@ -214,17 +214,10 @@ def simulate(
         return journal.run_of(partial(_run_scans, experiment, planner, journal, progress), score)
 
 
-def _with_truth(planner: Any, truth: Truth) -> Planner | None:
-    """Return the planner of this run; a planner that requires the true targets receives them."""
-    informed: Planner | None = planner.with_truth(truth) if isinstance(planner, RequiresTruth) else planner
-    return informed
-
-
-def _run_scans(
-    experiment: Experiment, planner: Planner | None, journal: Journal, progress: Callable[[int], None] | None
-) -> None:
+def _run_scans(experiment: Experiment, planner: Any, journal: Journal, progress: Callable[[int], None] | None) -> None:
     """Simulate every scan of a run, one after the other, and note each in the journal."""
-    planner = _with_truth(planner, journal.truth)
+    if isinstance(planner, RequiresTruth):
+        planner = planner.with_truth(journal.truth)
     stream = RANDOM_CONTROL if isinstance(planner, RandomPlanner) else PLANNER
     planner_rng = run_stream(journal.seed, journal.run, stream)
     world = SimulationRun(

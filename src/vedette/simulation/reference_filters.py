@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -36,11 +37,30 @@ class _Reference:
         """Return a density without targets."""
         return LMB.empty(self.targets.state_dim, self.targets.num_classes)
 
-    def _believed(self, labels: Any, means: Floats, covs: Floats) -> tuple[LMB, FilterInfo]:
+    def step(
+        self,
+        belief: Any,
+        scans: Any,
+        poses: Any,
+        dt: float,
+        step: int,
+        *,
+        rng: np.random.Generator,
+        births: LMB | None = None,
+    ) -> tuple[LMB, FilterInfo]:
+        """Return the estimates at that step. Raises `InputError` for an oracle without a truth."""
+        ids, means, covs = self._estimated(scans, poses, dt, step, rng)
         info = unknown_info(len(means))
         if len(means) == 0:
             return self.initial(), info
+        labels = [(1, target) for target in ids]
         return LMB.from_bernoullis(labels, np.full(len(means), _SURE), means, covs), info
+
+    def _estimated(
+        self, scans: Any, poses: Any, dt: float, step: int, rng: np.random.Generator
+    ) -> tuple[Sequence[int], Floats, Floats]:
+        """Return the number, mean and covariance of each estimated target."""
+        raise NotImplementedError
 
 
 @dataclass(slots=True, eq=False)
@@ -63,18 +83,9 @@ class OracleFilter(_Reference):
         """Return the filter for the targets of a run."""
         return replace(self, truth=truth)
 
-    def step(
-        self,
-        belief: Any,
-        scans: Any,
-        poses: Any,
-        dt: float,
-        step: int,
-        *,
-        rng: np.random.Generator,
-        births: LMB | None = None,
-    ) -> tuple[LMB, FilterInfo]:
-        """Return the estimates at that step. Raises `InputError` without a truth."""
+    def _estimated(
+        self, scans: Any, poses: Any, dt: float, step: int, rng: np.random.Generator
+    ) -> tuple[Sequence[int], Floats, Floats]:
         if self.truth is None:
             raise InputError("truth: expected the targets of the run, as of with_truth(); got None")
         ids, states = self.truth.at(step - 1)
@@ -92,30 +103,20 @@ class OracleFilter(_Reference):
         covs = 0.5 * (covs + covs.swapaxes(1, 2))
         self._covs = dict(zip(ids.tolist(), covs, strict=True))
         errors = np.linalg.cholesky(covs) @ rng.standard_normal((len(ids), dim, 1))
-        return self._believed([(1, target) for target in ids.tolist()], states + errors[:, :, 0], covs)
+        return ids.tolist(), states + errors[:, :, 0], covs
 
 
 @dataclass(slots=True, eq=False)
 class LastScanFilter(_Reference):
     """Tracker that takes every measurement of the largest scan for a target: the result without memory and models."""
 
-    def step(
-        self,
-        belief: Any,
-        scans: Any,
-        poses: Any,
-        dt: float,
-        step: int,
-        *,
-        rng: np.random.Generator,
-        births: LMB | None = None,
-    ) -> tuple[LMB, FilterInfo]:
-        """Return a target at every measurement of the largest scan."""
+    def _estimated(
+        self, scans: Any, poses: Any, dt: float, step: int, rng: np.random.Generator
+    ) -> tuple[Sequence[int], Floats, Floats]:
         taken_scans = [(scan, s) for s, scan in enumerate(scans) if scan is not None]
         scan, s = max(taken_scans, key=lambda entry: len(entry[0]), default=(np.empty((0, 2)), 0))
         dim = self.targets.state_dim
         means = (
             self.sensors[s].measurement.states_at(np.asarray(scan), poses[s], dim) if len(scan) else np.empty((0, dim))
         )
-        covs = np.tile(UNKNOWN_VARIANCE * np.eye(dim), (len(scan), 1, 1))
-        return self._believed([(1, i) for i in range(len(scan))], means, covs)
+        return range(len(scan)), means, np.tile(UNKNOWN_VARIANCE * np.eye(dim), (len(scan), 1, 1))

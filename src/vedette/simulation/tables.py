@@ -16,7 +16,7 @@ import numpy as np
 
 from vedette.densities.estimates import Estimate
 from vedette.errors import InputError
-from vedette.kernels.base.types import Bools, Floats, Ints
+from vedette.kernels.base.types import Floats, Ints
 from vedette.simulation.arrow import Columns, Kind, Layout
 from vedette.simulation.decision_tables import DECISION_TABLES, OWN_REWARDS, decision_tables, decisions_of
 from vedette.simulation.explanation_tables import EXPLANATION_TABLES, explanation_tables, with_explanations
@@ -96,8 +96,9 @@ def record_of(
 
     Raises `InputError`, `KeyError`, `TypeError` or `ValueError` for inconsistent tables.
     """
-    summary, poses = summary_of(facts, tables, timings), _poses_of(tables)
+    summary, poses, file = summary_of(facts, tables, timings), _poses_of(tables), facts.get("recording")
     times, decisions = summary.times, summary.decisions
+    off = tables["sensors"].get(OFF, np.zeros(poses.shape[:2]))
     if any(name in tables for name in EXPLANATION_TABLES):
         decisions = with_explanations(decisions, tables)
     if "undetected" in tables:
@@ -112,19 +113,15 @@ def record_of(
             times, _offsets(tables["truth"], len(times)), tables["truth"]["target"], _matrix(tables["truth"], "state_")
         ),
         poses=poses,
-        off=_off_of(tables, poses),
+        off=np.reshape(off == 1, poses.shape[:2]),
         estimates=_estimates_of(tables["tracks"], len(times)),
         decisions=decisions,
         ospa=summary.ospa,
         health=summary.health,
         timings=timings,
         stopped=None if facts["stopped"] is None else str(facts["stopped"]),
-        recording=_recording_of(facts.get("recording")),
+        recording=None if file is None else ScansFile(str(file["name"]), str(file["sha256"])),
     )
-
-
-def _recording_of(fact: Any) -> ScansFile | None:
-    return None if fact is None else ScansFile(str(fact["name"]), str(fact["sha256"]))
 
 
 # Tables that `summary_of` needs.
@@ -169,12 +166,6 @@ def _poses_of(tables: Mapping[str, Mapping[str, Any]]) -> Floats:
     return np.stack([sensors[name] for name in columns], axis=1).reshape(num_scans, -1, len(columns))
 
 
-def _off_of(tables: Mapping[str, Mapping[str, Any]], poses: Floats) -> Bools:
-    """(num_scans, num_sensors)."""
-    off = tables["sensors"].get(OFF)
-    return np.zeros(poses.shape[:2], np.bool_) if off is None else (off == 1).reshape(poses.shape[:2])
-
-
 def _truth(record: RunRecord) -> Columns:
     truth = record.truth
     scans = truth.scans
@@ -182,7 +173,7 @@ def _truth(record: RunRecord) -> Columns:
 
 
 def _tracks(record: RunRecord) -> Columns:
-    scans = np.repeat(np.arange(record.num_scans), _counts(record))
+    scans = np.repeat(np.arange(record.num_scans), [len(estimate.labels) for estimate in record.estimates])
     labels = np.concatenate([estimate.labels for estimate in record.estimates])
     covs = np.concatenate([estimate.covs for estimate in record.estimates])
     return {
@@ -221,10 +212,6 @@ def _sensors(record: RunRecord) -> Columns:
         **{name: getattr(record.health, name).ravel() for name in SENSOR_COLUMNS},
         **({OFF: record.off.ravel().astype(np.int64)} if record.off.any() else {}),
     }
-
-
-def _counts(record: RunRecord) -> Ints:
-    return np.array([len(estimate.labels) for estimate in record.estimates], np.int64)
 
 
 def _columns(start: str, matrix: Floats) -> Columns:

@@ -152,7 +152,9 @@ class BeliefNetwork(LocalFilters):
                 for j in range(num)
             ]
             messages = {j: sent for j, sent in enumerate(newest) if sent is not None and shares[i, j] > 0.0}
-            weights = self._received_weights(shares[i, list(messages)])
+            weights = shares[i, list(messages)]
+            if not requires_common_prior(self.fusion):  # of a mean
+                weights = weights / weights.sum()
             key = (*((j, sent.step) for j, sent in messages.items()), *weights.tolist())
             if key not in cache:
                 cache[key] = self._fuse(list(messages.values()), list(messages), weights)
@@ -160,10 +162,6 @@ class BeliefNetwork(LocalFilters):
             beliefs.append(belief)
             reports.append(report)
         return beliefs, reports
-
-    def _received_weights(self, shares: Floats) -> Floats:
-        """Return the weights of the received messages: scaled to sum 1 for a mean, unchanged for a sum."""
-        return shares if requires_common_prior(self.fusion) else shares / shares.sum()
 
     def _fuse(
         self, messages: Sequence[_SentMessages], senders: Sequence[int], weights: Floats

@@ -192,13 +192,14 @@ class OutOfSequenceTracker:
         """
         arrived: dict[float, dict[int, SensorScan]] = {}
         first, newest, dropped = math.inf, timeline.newest, list[SensorScan]()
+        settled = -math.inf if timeline.final_state.time is None else timeline.final_state.time
         num_processed = num_late = num_repeated = 0
         for given in scans:
             scan = copy_scan(given, len(self.tracker.sensors))
             if len(scan.pose) > self._start.shape[1]:
                 expected = f"at most {self._start.shape[1]} numbers, as of poses"
                 raise reject(f"{scan_name(scan)}, pose", expected, len(scan.pose))
-            if newest is not None and (scan.time < newest - self.window or _is_final(timeline, scan.time)):
+            if newest is not None and (scan.time < newest - self.window or scan.time <= settled):
                 dropped.append(scan)
                 continue
             known = _scans_at(timeline, scan.time) | arrived.get(scan.time, {})
@@ -311,11 +312,6 @@ def scan_name(scan: SensorScan) -> str:
 def _num_before(timeline: Timeline, time: float) -> int:
     """Return the number of instants before a time."""
     return bisect_left(timeline.entries, time, key=_TIME)
-
-
-def _is_final(timeline: Timeline, time: float) -> bool:
-    """Return True if a time is not after the settled state."""
-    return timeline.final_state.time is not None and time <= timeline.final_state.time
 
 
 def _scans_at(timeline: Timeline, time: float) -> dict[int, SensorScan]:

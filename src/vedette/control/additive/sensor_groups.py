@@ -17,7 +17,7 @@ from vedette.densities.checks import offsets_of
 from vedette.densities.containers import unchecked
 from vedette.densities.tracks import places_of, single_gaussians, take_tracks
 from vedette.internal.probabilities import logit
-from vedette.kernels.base.types import Bools, Floats, Ints, Lmb
+from vedette.kernels.base.types import Floats, Ints, Lmb
 from vedette.kernels.planning.ideal import EXPECTED, IDEAL, Decision, SampledTrajectories
 from vedette.kernels.planning.known_association import rows_without_scans
 from vedette.kernels.planning.reach import Belief, Paths, label_radii, predict_paths
@@ -106,7 +106,17 @@ def prepare_groups(task: Task, missing_existence: float, *, rng: np.random.Gener
     scans = scans_within(task.sensors, task.options, task.state.time, settings)
     groups, bases = list[SensorGroup](), [prior] * len(task.sensors)
     for members in _alike(task, shared=shared):
-        group = _group(task, members, scans, samples, prior, rng)
+        sensor = task.sensors[members[0]]
+        futures = samples.futures(sensor.filter.sensor.meas_dim, settings, rng=rng)
+        courses = np.concatenate([task.options[s].courses for s in members])
+        scans_at = np.concatenate([scans[s] for s in members])
+        decision = decision_of(sensor, courses, futures, settings, scans_at, None if task.sampled else "mean")
+        labels, now, paths, rows = _without_scans(task.prediction, task.state.local[members[0]], decision, prior)
+        targets = np.ascontiguousarray(samples.targets[labels])
+        offsets = offsets_of([len(task.options[s].courses) for s in members])
+        belief = Belief(now, paths, targets, label_radii(paths, targets, samples.states))
+        reach = sensor.filter.sensor.detection.reach
+        group = SensorGroup(members, belief, labels, decision, rows, offsets, reach)
         row = _spread(group, prior, missing_existence)
         for s in members:
             bases[s] = row
@@ -128,27 +138,6 @@ def _alike(task: Task, *, shared: bool) -> list[tuple[int, ...]]:
 def _model_key(model: SensorModel) -> tuple[object, ...]:
     """Return a key that is equal for sensors with equal models (cached)."""
     return tuple(part.tobytes() if isinstance(part, np.ndarray) else part for part in model.to_kernel())
-
-
-def _group(
-    task: Task,
-    members: tuple[int, ...],
-    scans: Sequence[Bools],
-    samples: Samples,
-    prior: Floats,
-    rng: np.random.Generator,
-) -> SensorGroup:
-    """Return the group of these sensors. scans: from `scans_within`. prior: rows of the prediction."""
-    sensor, settings = task.sensors[members[0]], task.settings
-    futures = samples.futures(sensor.filter.sensor.meas_dim, settings, rng=rng)
-    courses = np.concatenate([task.options[s].courses for s in members])
-    scans_at = np.concatenate([scans[s] for s in members])
-    decision = decision_of(sensor, courses, futures, settings, scans_at, None if task.sampled else "mean")
-    labels, now, paths, rows = _without_scans(task.prediction, task.state.local[members[0]], decision, prior)
-    targets = np.ascontiguousarray(samples.targets[labels])
-    offsets = offsets_of([len(task.options[s].courses) for s in members])
-    belief = Belief(now, paths, targets, label_radii(paths, targets, samples.states))
-    return SensorGroup(members, belief, labels, decision, rows, offsets, sensor.filter.sensor.detection.reach)
 
 
 def _without_scans(

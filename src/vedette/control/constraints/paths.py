@@ -46,7 +46,7 @@ class VisibilityGraph:
         """Return the graph of zones, each the interior of polygons (num_corners, 2), m, by the even-odd rule."""
         from scipy.sparse.csgraph import shortest_path
 
-        zones = [[_distinct(ring) for ring in rings] for rings in zones]
+        zones = [[ring[np.any(ring != np.roll(ring, 1, axis=0), axis=1)] for ring in rings] for rings in zones]
         pairs = [edges_of(rings) for rings in zones]
         starts, ends = (np.concatenate(each) for each in zip(*pairs, strict=True))
         edges = Edges(starts, ends, np.repeat(np.arange(len(pairs)), [len(own) for own, _ in pairs]))
@@ -203,11 +203,6 @@ def _is_free(edges: Edges, points: Floats) -> Bools:
     """Return (num_points,) whether each point is in no zone and on no edge."""
     inside = _inside(edges, points)
     return ~inside.any(axis=1) & np.isinf(first_touches(points, points, edges, np.zeros_like(inside)))
-
-
-def _distinct(ring: Floats) -> Floats:
-    """Return a polygon without repeated consecutive corners."""
-    return ring[np.any(ring != np.roll(ring, 1, axis=0), axis=1)]
 
 
 def _near_corners(corners: Floats) -> tuple[Floats, Floats]:

@@ -75,7 +75,8 @@ class FeasibleSequences:
             self._are_compatible(*one, *two) for one, two in pairs
         ):
             return False
-        return all(self._num_active(joint, stage) <= self.most_active for stage in range(1, self._depth + 1))
+        stages = range(1, self.trees[0].stages.depth + 1) if self.mask.active is not None else ()
+        return all(self._num_active(joint, stage) <= self.most_active for stage in stages)
 
     def after(self, sensor: int, taken: Sequence, others: Several[Sequence | None]) -> Sequence:
         """Return feasible next courses of one sensor, given the other sensors' choices; may be empty.
@@ -124,10 +125,6 @@ class FeasibleSequences:
     def most_active(self) -> float:
         """Number of sensors that may scan; inf: all."""
         return math.inf if self.mask.active is None else self.mask.active.limit
-
-    @property
-    def _depth(self) -> int:
-        return self.trees[0].stages.depth if self.mask.active is not None else 0
 
     def _num_active(self, joint: Several[Sequence | None], stage: int) -> int:
         """Return the number of sensors that scan after a decision, counted from 1, among sequences that reach it."""

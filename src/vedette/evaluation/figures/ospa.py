@@ -94,7 +94,11 @@ def ospa_figure(comparison: Comparison, *, parts: Sequence[str] = ("total",)) ->
     for panel, part in zip(panels, parts, strict=True):
         draw_ospa(panel, comparison, part)
     panels[-1].set_xlabel("Time (s)")
-    handles, labels = panels[0].get_legend_handles_labels()
+    return _with_legend(figure, panels[0])
+
+
+def _with_legend(figure: Figure, axes: Axes) -> Figure:
+    handles, labels = axes.get_legend_handles_labels()
     figure.legend(
         handles, labels, loc="outside upper center", ncols=legend_columns(labels), columnspacing=1.2, handlelength=1.8
     )
@@ -120,11 +124,7 @@ def differences_figure(comparison: Comparison) -> Figure:
     draw_ospa(above, comparison, "total")
     _limit_height(above, comparison, since_first_decision(comparison))
     draw_differences(below, comparison)
-    handles, labels = above.get_legend_handles_labels()
-    figure.legend(
-        handles, labels, loc="outside upper center", ncols=legend_columns(labels), columnspacing=1.2, handlelength=1.8
-    )
-    return figure
+    return _with_legend(figure, above)
 
 
 def since_first_decision(comparison: Comparison) -> Bools:

@@ -39,7 +39,7 @@ from vedette.evaluation.figures.style import (
 )
 from vedette.internal.text import named_in
 from vedette.kernels.base.types import Floats, Ints
-from vedette.simulation.records import Decision, RunRecord
+from vedette.simulation.records import RunRecord
 
 LARGE = 5000.0  # m; axes of a larger extent are in kilometres
 _MANY_SCANS = 200  # with more scans, estimates are drawn smaller
@@ -112,9 +112,14 @@ def overview_figure(
     left.set_title(f"{short_label(strategy)}, {record.source}", pad=_TITLE_PAD)
     above = right
     if is_comparison:
-        _draw_differences(right, comparison)
+        draw_differences(right, comparison)
+        minus = f"minus {short_label(comparison.strategies[0])}"
+        right.set_ylabel(f"{named_in('OSPA', comparison.unit)} {minus}")
         above = figure.add_subplot(grid[0, 1])
-        _draw_error(above, comparison)
+        draw_ospa(above, comparison, "total")
+        above.set_ylabel(named_in("OSPA", comparison.unit), fontsize=6)
+        above.tick_params(labelsize=6)
+        above.yaxis.set_major_locator(MaxNLocator(3))
     else:
         draw_ospa(right, comparison, "total")
         right.set_xlabel("Time (s)")
@@ -123,21 +128,6 @@ def overview_figure(
     above.legend(handles, labels, loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=columns, frameon=False)
     add_legend(figure, record, scene, shade)
     return figure
-
-
-def _draw_differences(axes: Axes, comparison: Comparison) -> None:
-    """Draw the paired differences."""
-    draw_differences(axes, comparison)
-    minus = f"minus {short_label(comparison.strategies[0])}"
-    axes.set_ylabel(f"{named_in('OSPA', comparison.unit)} {minus}")
-
-
-def _draw_error(axes: Axes, comparison: Comparison) -> None:
-    """Draw the error over the whole run, small."""
-    draw_ospa(axes, comparison, "total")
-    axes.set_ylabel(named_in("OSPA", comparison.unit), fontsize=6)
-    axes.tick_params(labelsize=6)
-    axes.yaxis.set_major_locator(MaxNLocator(3))
 
 
 def draw_tracks(axes: Axes, record: RunRecord, scale: float, scene: Scene, shade: str = "") -> None:
@@ -236,18 +226,18 @@ def _draw_sensor(
             continue
         place = _point(decision.poses[sensor, :2] * scale)
         arrow = {"arrowstyle": "<|-", "color": INK, "linewidth": 0.9, "shrinkA": 0, "shrinkB": 0}
-        direction = 13.0 * _direction(decision, sensor)
+        plan = decision.plan
+        row = dict(zip(plan.actions[sensor].columns, plan.chosen_actions[sensor].tolist(), strict=True))
+        direction = 13.0 * _direction(row)
         if direction.any():
             axes.annotate("", place, xytext=_point(direction), textcoords="offset points", arrowprops=arrow, zorder=7)
-        _draw_field(axes, decision, sensor, 0.12 * plot_extent([record]), scale)
+        _draw_field(axes, row, decision.poses[sensor], 0.12 * plot_extent([record]), scale)
         axes.plot(*place, marker="o", markersize=6.0, color=INK, markerfacecolor="white", markeredgewidth=0.7, zorder=8)
         axes.annotate(str(number), place, ha="center", va="center_baseline", fontsize=5, zorder=9)
 
 
-def _draw_field(axes: Axes, decision: Decision, sensor: int, size: float, scale: float) -> None:
+def _draw_field(axes: Axes, row: dict[str, float], pose: Floats, size: float, scale: float) -> None:
     """Draw a sector of a given size in the chosen pointing direction of the sensor."""
-    plan, pose = decision.plan, decision.poses[sensor]
-    row = dict(zip(plan.actions[sensor].columns, plan.chosen_actions[sensor].tolist(), strict=True))
     middle = drawn_angle(row, "pointing_deg", "azimuth_deg")
     if middle is not None:
         half = row.get("half_width_deg", float(np.rad2deg(pose[4])) if len(pose) > 4 else 0.0)
@@ -255,10 +245,8 @@ def _draw_field(axes: Axes, decision: Decision, sensor: int, size: float, scale:
         axes.add_patch(Wedge(_point(pose[:2] * scale), size * scale, *sides, color=INK, alpha=0.2, lw=0, zorder=5))
 
 
-def _direction(decision: Decision, sensor: int) -> Floats:
+def _direction(row: dict[str, float]) -> Floats:
     """Return the unit vector of the sensor's chosen direction; 0 if its action is neither a heading nor a step."""
-    plan = decision.plan
-    row = dict(zip(plan.actions[sensor].columns, plan.chosen_actions[sensor].tolist(), strict=True))
     heading = drawn_angle(row)
     if heading is not None and row.get("distance_m") != 0.0:
         return np.array([np.cos(np.deg2rad(heading)), np.sin(np.deg2rad(heading))])

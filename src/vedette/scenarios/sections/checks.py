@@ -92,9 +92,7 @@ def _fusion_of_kind(model: ScenarioModel) -> Iterator[Finding]:
     if kind == "cm_delta_glmb" and filters == "lmb":
         wanted = "sequential, parallel, clmb, arithmetic_average, central or none, as the filters are lmb"
         yield ("fusion", "kind"), wanted, describe(kind)
-    if filters in ("lmb", "custom", *UNLABELLED):
-        return
-    if filters == "factored_glmb":
+    if filters in ("lmb", "factored_glmb", "custom", *UNLABELLED):
         return
     if kind == "parallel":
         wanted = f"sequential or another, as parallel is of lmb or factored_glmb filters, and these are {filters}"

@@ -133,7 +133,10 @@ def _platform(data: Mapping[str, Any], compass: Compass, place: Any) -> dict[str
     for key, name in (("courses_deg", _LISTS.get(str(data.get("kind")))), ("azimuths_deg", "pointings_deg")):
         if name is not None:
             converted = _convert_key(
-                converted, key, name, lambda given: [-each if is_relative else _heading(each) for each in given]
+                converted,
+                key,
+                name,
+                lambda given: [-each if is_relative else (270.0 - each) % 360.0 - 180.0 for each in given],
             )
     if _is_mapping(converted.get("platform")):
         converted["platform"] = _platform(converted["platform"], compass, place)
@@ -153,11 +156,6 @@ def _convert_key(data: Mapping[str, Any], key: str, name: str, change: Any) -> d
 def _angle(azimuth: float, compass: Compass, place: Any) -> float:
     """Return the heading of a course at a place of the plane, deg."""
     return math.degrees(float(compass.angle(math.radians(azimuth), place)))
-
-
-def _heading(course: float) -> float:
-    """Return the true direction of a course, deg counter-clockwise from east in [-180, 180)."""
-    return (270.0 - course) % 360.0 - 180.0
 
 
 def _is_mapping(value: Any) -> TypeGuard[Mapping[str, Any]]:

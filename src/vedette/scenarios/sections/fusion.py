@@ -148,11 +148,6 @@ class Fusion(Section):
         """True if the fused density replaces the sensors' own."""
         return self.feedback or self.kind == "parallel"
 
-    @property
-    def decides_in_full(self) -> bool:
-        """True if joint decisions count every sensor's scans in full, for any reward."""
-        return self.kind in (*FULL_INFORMATION_FUSIONS, "arithmetic_average") or self.field_of_view_weighting
-
     def scaled_weights(self, num_sensors: int) -> tuple[float, ...]:
         """Return the weight of each sensor (default: equal), scaled to a sum of one beyond the rounding of the file."""
         given = self.weights or (1.0,) * num_sensors
@@ -177,7 +172,7 @@ class Fusion(Section):
         """
         from vedette.fusion import ParallelUpdate
 
-        if self.decides_in_full:
+        if self.kind in (*FULL_INFORMATION_FUSIONS, "arithmetic_average") or self.field_of_view_weighting:
             return ParallelUpdate()
         lmbs = self.kind == "clmb" or (of_lmbs and self.kind == "none")
         kind: FusionKind = "clmb" if lmbs else "cm_delta_glmb"

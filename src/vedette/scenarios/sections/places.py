@@ -73,7 +73,10 @@ def is_place(value: Any) -> bool:
 def _converted(value: Any, origin: Origin) -> Any:
     if isinstance(value, Mapping):
         if set(value) == _PLACE:
-            return _point(value, origin)
+            try:
+                return origin.to_plane([value["lon"]], [value["lat"]])[0].tolist() if _is_on_earth(value) else value
+            except InputError:
+                return value
         if set(value) == set(_BOX):
             return _region(value, origin)
         return {key: _converted(item, origin) for key, item in value.items()}
@@ -83,13 +86,6 @@ def _converted(value: Any, origin: Origin) -> Any:
             return [*items[0], *items[1:]] if isinstance(items[0], list) else items  # a state
         return items
     return value
-
-
-def _point(place: Mapping[str, Any], origin: Origin) -> Any:
-    try:
-        return origin.to_plane([place["lon"]], [place["lat"]])[0].tolist() if _is_on_earth(place) else place
-    except InputError:
-        return place
 
 
 def _is_on_earth(place: Mapping[str, Any]) -> bool:
