@@ -80,7 +80,7 @@ def test_without_true_targets_there_are_no_errors(tmp_path: Path) -> None:
     assert not any(math.isnan(value) for rows in data["estimates"] for row in rows for value in row[1:])
     words = words_of(record, scenario, tmp_path)
     assert "No errors are shown: nobody knows the targets." in words
-    assert "Targets dropped" in words
+    assert "Independence error" in words
     assert "GOSPA" not in words
 
 

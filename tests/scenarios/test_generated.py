@@ -34,7 +34,7 @@ def test_scenes_of_any_size_are_valid(num_sensors: int, pattern: str, view: str)
 
 
 @pytest.mark.parametrize(
-    ("settings", "most"), [((50, None), 200), ((51, None), 204), ((150, 300), 600), ((2, 900), 904)]
+    ("settings", "most"), [((50, None), 1000), ((251, None), 1004), ((150, 300), 1000), ((2, 1000), 1004)]
 )
 def test_a_scene_has_labels_for_all_its_targets(settings: tuple[int, int | None], most: int) -> None:
     found = scenario(num_sensors=settings[0], num_targets=settings[1])
@@ -46,7 +46,7 @@ def test_a_scene_has_labels_for_all_its_targets(settings: tuple[int, int | None]
 
 
 def test_more_targets_than_a_filter_keeps_by_default_are_all_tracked() -> None:
-    """Four targets a sensor: 240, of which a cap of 200 would lose 40."""
+    """Four targets a sensor."""
     short = {"time.num_steps": 4, "control.decision_steps": []}
     found = replace_fields(scenario(num_sensors=60, num_targets=240), short)
     record = run_scenario(found, "stationary", seed=0)

@@ -210,7 +210,7 @@ def _state(searching: UndetectedTargetTracker, mean: Any, std: float, existence:
 
 @pytest.mark.parametrize("scanned", [False, True])
 def test_dropped_labels_become_undetected_targets(scanned: bool) -> None:
-    dropping, keeping = _without_limits(min_existence=0.9), _without_limits()
+    dropping, keeping = _without_limits(max_position_std=1.0), _without_limits()
     state, scans = _state(dropping, (170.0, -80.0), 3.0), [np.empty((0, 2)) if scanned else None] * 2
     after, _ = dropping.step(state, scans, POSES, 2.0, rngs=rngs(2))
     kept, _ = keeping.step(state, scans, POSES, 2.0, rngs=rngs(2))

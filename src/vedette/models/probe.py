@@ -128,6 +128,10 @@ def probe_jacobian(
 
 
 def central_differences(function: ModelFunction, args: tuple[Any, ...], shape: tuple[int, int], angular: Any) -> Floats:
+    """Return the Jacobian of a model function at the first argument, by central differences.
+
+    args: state and further arguments. shape: of the Jacobian. angular: which components of the result are angles.
+    """
     state, rest = args[0], args[1:]
     slopes = np.empty(shape)
     ahead, behind = np.empty(shape[0]), np.empty(shape[0])

@@ -15,7 +15,7 @@ VIEWS = ("full", "limited")
 _MAX_SENSORS, _MAX_TARGETS = 1000, 2000
 
 NUM_STEPS = 60
-_DEFAULT_MAX_LABELS = 200  # default of a filter whose file gives none
+_DEFAULT_MAX_LABELS = 1000  # default of a filter whose file gives none
 _SIDE = 500.0  # m, side of the square that each sensor adds
 _GROUP_SIZE = 4  # targets that start or end at one place
 _SPEEDS = (3.0, 8.0)  # m/s

@@ -59,7 +59,8 @@ class NewTargets(NamedTuple):
         if math.isinf(needed):
             return "no number of detections suffices to report a new target"
         numbers = f"{pluralise(round(needed), 'detection')} ({seconds:.2g} s)"
-        return f"a new target needs about {numbers} to be reported, and gives about {given:.2g}"
+        given_in = f"about {given:.2g} in the run, its life and the view"
+        return f"a new target needs about {numbers} to be reported, and gives {given_in}"
 
 
 class _Source(NamedTuple):
@@ -76,8 +77,8 @@ def new_target_warnings(scenario: Scenario) -> Iterator[tuple[Path, str]]:
     """Yield a warning if most new targets need more detections than they give."""
     found = new_targets(scenario)
     if found is not None and found.late_share > MOST_LATE:
-        text = f"{found.describe()} (run, survival, view): births are rare, or measurements imprecise, for this clutter"
-        yield ("birth",), f"{text}; check birth, and clutter, noise and detection of the sensors"
+        text = f"{found.describe()}; births are rare, or measurements imprecise, for this clutter"
+        yield ("birth",), f"{text}: check birth, and clutter, noise and detection of the sensors"
 
 
 def new_targets(scenario: Scenario, num_scans: int | None = None) -> NewTargets | None:
