@@ -81,7 +81,7 @@ class WithBirths(SummaryRepr):
     targets: TargetModel
     limits: Limits
 
-    def _limits(self, sensor: SensorModel) -> Limits:
+    def step_limits(self, sensor: SensorModel) -> Limits:
         """Return the limits of an update with a scan of a sensor."""
         return self.limits.for_births(self.targets.birth, sensor.clutter.rate)
 
@@ -251,7 +251,7 @@ class LabelledFilter(SingleSensorFilter, LabelledFilterBase[BeliefT]):
         place: str,
     ) -> tuple[BeliefT, FilterInfo]:
         try:
-            step = SensorStep(inputs, self._limits(self.sensor), self.sensor, rng=rng)
+            step = SensorStep(inputs, self.step_limits(self.sensor), self.sensor, rng=rng)
             posterior, report = self._run_kernel(prior, step)
         except Exception as error:
             raise_model_error(error)

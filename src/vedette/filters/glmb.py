@@ -35,7 +35,7 @@ class _GlmbFilterBase(LabelledFilterBase[GLMB]):
     marginalised: bool
 
     def _before_scan(self, prior: GLMB, dt: float, step: Any, births: LMB | None) -> Any:
-        if dt > 0.0 and self.targets.birth.period is not None:
+        if dt > 0.0 and self.targets.birth.period is not None and prior.num_hyps >= self.limits.max_hypotheses:
             born = expit(self._births(dt, step, None, births).existence_logit)
             existence, most = existence_probabilities(prior)[1], self.limits.max_hypotheses
             # Labels of at most twice the probability of a birth are taken as unconfirmed.

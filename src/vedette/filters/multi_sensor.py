@@ -163,7 +163,7 @@ class SequentialUpdate(MultiSensorFilter[BeliefT]):
         reports, log_total, last = list[Any](), 0.0, len(taken.names) - 1
         given = zip(taken.names, taken.sensors, taken.sequential_inputs(born, dt), strict=True)
         for s, (name, sensor, scan) in enumerate(given):
-            limits = self._limits(sensor) if s == last else keeping
+            limits = self.step_limits(sensor) if s == last else keeping
             own = sensor.to_kernel(), limits.truncation(sensor.meas_dim)
             step = SensorStep((scan, motion if s == 0 else None, *own), limits, sensor, len(taken.names))
             with model_errors():

@@ -39,7 +39,7 @@ class MultiSensorLmbFilter(LmbFilterBase, MultiSensorFilter[LMB]):
     """
 
     def _updated(self, prior: Lmb, born: Lmb, taken: SensorScans, dt: float, place: str) -> tuple[LMB, FilterInfo]:
-        limits, num_columns, reports = self._limits(self.sensors[0]), 0, []
+        limits, num_columns, reports = self.step_limits(self.sensors[0]), 0, []
         motion, before = self._motion(dt), prior
         reduction = limits.reduction()
         with model_errors():
