@@ -100,7 +100,7 @@ def test_a_filter_in_python_warns_where_a_scenario_is_refused(
 ) -> None:
     """At the first step at which the unconfirmed labels of one site are as many as the check refuses."""
     targets, sensor = models_of(existence, 1)
-    local = MultiSensorGlmbFilter(targets, [sensor]) if several else DeltaGlmbFilter(targets, sensor)
+    local = MultiSensorGlmbFilter(targets, (sensor,)) if several else DeltaGlmbFilter(targets, sensor)
     each = 1.0 - (1.0 - existence) ** dt
     refused = [n for n in range(1, every + 1) if cut_share(n, each, 300) > MAX_CUT_SHARE]
     expected = refused[0] if refused and refused[0] <= steps else None

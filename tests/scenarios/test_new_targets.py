@@ -139,7 +139,8 @@ def test_diagnostics_of_new_targets() -> None:
     assert levels(tuple(new_target_diagnostics(targets, health, 7))) == ["ok", "ok", "ok"]
     late = tuple(new_target_diagnostics(found_of(15.0)[0], health, 7))
     assert levels(late) == ["check", "ok", "ok"]
-    assert late[0].text == "a new target needs about 15 detections (15 s) to be reported, and gives about 10 in the run, its life and the view"
+    text = "a new target needs about 15 detections (15 s) to be reported, and gives about 10"
+    assert late[0].text == f"{text} in the run, its life and the view"
     missing = tuple(new_target_diagnostics(targets, health, 0))
     assert levels(missing) == ["ok", "ok", "check"]
     assert missing[2].text == "none, 8 expected (probability 0.0003)"

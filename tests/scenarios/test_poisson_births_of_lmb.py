@@ -114,7 +114,7 @@ def test_two_missed_targets_of_one_site_are_both_counted() -> None:
 
     The exact mean is .79. A PMB has .85, and labels that contend for both targets .21.
     """
-    birth = models.BirthModel([0.05], [[0.0, 0.0, 0.0, 0.0]], [np.diag([1e4, 1e4, 25.0, 25.0])])
+    birth = models.BirthModel(np.array([0.05]), np.zeros((1, 4)), np.diag([1e4, 1e4, 25.0, 25.0])[np.newaxis])
     targets = models.TargetModel(models.constant_velocity(1.0), models.constant_survival(0.98), birth)
     clutter = models.region_clutter(5.0, models.Region(-300.0, 300.0, -300.0, 300.0), "position")
     noise, detection = models.constant_noise([10.0, 10.0]), models.constant_detection(0.4)

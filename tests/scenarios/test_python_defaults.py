@@ -32,7 +32,7 @@ sensor_defaults:
   detection: {kind: limited_range, probability: 0.9, max_range: 30.0}
   clutter: {kind: region, rate: 2.0}
 """
-SITE = [0.1], [[9.0, 0.0, 0.0, 0.0]], [np.diag([25.0, 25.0, 4.0, 4.0])]
+SITE = np.array([0.1]), np.array([[9.0, 0.0, 0.0, 0.0]]), np.diag([25.0, 25.0, 4.0, 4.0])[np.newaxis]
 REGION = models.Region(-100.0, 100.0, -50.0, 50.0)
 
 
@@ -144,8 +144,8 @@ def test_a_filter_chooses_where_detection_is_taken() -> None:
         assert kind(targets, sensor).sensor.detection_at == expected
         given = dataclasses.replace(sensor, detection_at="centre")
         assert kind(targets, given).sensor is given
-    assert filters.SequentialFactoredFilter(targets, [sensor]).sensors[0].detection_at == "mean"
-    assert filters.SequentialLmbFilter(targets, [sensor]).sensors[0].detection_at == "centre"
+    assert filters.SequentialFactoredFilter(targets, (sensor,)).sensors[0].detection_at == "mean"
+    assert filters.SequentialLmbFilter(targets, (sensor,)).sensors[0].detection_at == "centre"
 
 
 @pytest.mark.parametrize("measured", [29.0, 31.0])
@@ -155,7 +155,9 @@ def test_a_first_detection_inside_an_edge_has_its_exact_existence(measured: floa
     At the centre of the Gaussian of the site the probability of detection is 0, and no label begins.
     """
     mean, std, noise, existence = np.array([36.0, 0.0]), 5.0, 3.0, 0.1
-    birth = models.BirthModel([existence], [[*mean, 0.0, 0.0]], [np.diag([std**2, std**2, 4.0, 4.0])])
+    birth = models.BirthModel(
+        np.array([existence]), np.array([[*mean, 0.0, 0.0]]), np.diag([std**2, std**2, 4.0, 4.0])[np.newaxis]
+    )
     targets = models.TargetModel(models.constant_velocity(1.0), models.constant_survival(0.95), birth)
     clutter = models.region_clutter(2.0, REGION, "position")
     detection, scan = models.limited_range(0.9, 30.0), np.array([[measured, 0.0]])
