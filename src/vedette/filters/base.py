@@ -20,7 +20,7 @@ from vedette.filters.inputs import (
     no_births_for_kernel,
     raise_model_error,
 )
-from vedette.filters.limits import Limits
+from vedette.filters.limits import Limits, limits_for_births
 from vedette.filters.protocols import FilterInfo
 from vedette.internal.representation import SummaryRepr
 from vedette.kernels.association.truncation import Truncation
@@ -83,7 +83,7 @@ class WithBirths(SummaryRepr):
 
     def step_limits(self, sensor: SensorModel) -> Limits:
         """Return the limits of an update with a scan of a sensor."""
-        return self.limits.for_births(self.targets.birth, sensor.clutter.rate)
+        return limits_for_births(self.limits, self.targets.birth, sensor.clutter.rate)
 
     def _births(self, dt: float, step: Any, prior: LabelledDensity | None, births: LMB | None) -> Lmb:
         """Return the labels born within the `dt` seconds before a step, detected or not; see `births_for`."""

@@ -115,13 +115,6 @@ class Limits:
         """Return the fields that bound hypotheses, in kernel form."""
         return _truncation(self, meas_dim)
 
-    def for_births(self, birth: BirthModel, clutter_rate: float) -> Limits:
-        """Return the limits of a filter with labelled births: thresholds above a birth become a tenth of the weakest.
-
-        clutter_rate: mean number of false measurements of a scan.
-        """
-        return _for_births(self, birth, float(clutter_rate))
-
     def track_caps(self) -> MixtureCaps:
         """Return the fields that bound the mixture of a track, in kernel form."""
         log_min_weight = math.log(self.min_component_weight) if self.min_component_weight > 0.0 else -math.inf
@@ -132,7 +125,7 @@ class Limits:
 
         Components as improbable as the least existence are kept, since one target begins with each.
         """
-        least = min(self.min_component_weight, self.min_existence)
+        least = min(self.min_component_weight, self.min_existence or 1.0)
         log_least = math.log(least) if least > 0.0 else -math.inf
         return MixtureCaps(log_least, float(self.merge_distance), int(self.max_intensity_components))
 
@@ -194,7 +187,11 @@ def _reduction(limits: Limits) -> Reduction:
 
 
 @lru_cache(maxsize=1000)
-def _for_births(limits: Limits, birth: BirthModel, clutter_rate: float) -> Limits:
+def limits_for_births(limits: Limits, birth: BirthModel, clutter_rate: float) -> Limits:
+    """Return the limits of a filter with labelled births: thresholds above a birth become a tenth of the weakest.
+
+    clutter_rate: mean number of false measurements of a scan.
+    """
     least = birth.least_existence(clutter_rate)
     names = [name for name in _RELATIVE_TO_BIRTHS if least < getattr(limits, name) < 1.0]
     lowered: dict[str, Any] = dict.fromkeys(names, _SHARE_OF_BIRTH * least)

@@ -20,6 +20,7 @@ from vedette.densities import marginal_estimate
 from vedette.errors import InputError
 from vedette.kernels.base.types import Floats
 from vedette.models.measurement import wrap_periodic
+from vedette.models.sensor import with_default_detection_at
 from vedette.stonesoup.converting import ConvertedModels
 from vedette.stonesoup.scans import ScanConverter, Scans
 from vedette.tracking import State, TrackerInfo
@@ -62,7 +63,11 @@ class LabelledTracker(_TrackerMixInUpdate, Tracker):  # type: ignore[misc] # Sto
             self.tracker = self.models.tracker()
         if not isinstance(self.tracker, VedetteTracker):
             raise InputError(f"tracker: expected one of vedette.tracking; got {type(self.tracker).__name__}")
-        if self.tracker.targets != self.models.targets or self.tracker.sensors != self.models.sensors:
+        own = tuple(
+            sensor if given.detection_at is None else with_default_detection_at(sensor, given.detection_at)
+            for sensor, given in zip(self.models.sensors, self.tracker.sensors, strict=False)
+        )
+        if self.tracker.targets != self.models.targets or self.tracker.sensors != own:
             raise InputError("tracker: expected one of models.targets and models.sensors; got one of others")
         self.state: State = self.tracker.initial()
         self.info: TrackerInfo | None = None

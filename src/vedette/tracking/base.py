@@ -151,13 +151,18 @@ class TrackerWrapper:
 
 
 def check_step(
-    state: State, scans: Sequence[Any], poses: Any, time: float, rngs: Sequence[Any], tracker: Tracker
+    state: State,
+    scans: Sequence[Any],
+    poses: Any,
+    time: float,
+    rngs: Sequence[Any],
+    tracker: Tracker,
+    num_sensors: int,
 ) -> tuple[Floats, float]:
     """Return the poses as an array and the seconds since the last scan, at the first scan the period of births.
 
     Raises `InputError` as `Tracker.step` does.
     """
-    num_sensors = len(tracker.sensors)
     if not isinstance(state, State):
         raise InputError(f"state: expected a State; got {type(state).__name__}")
     one_a_sensor(num_sensors, scans=scans, poses=poses, rngs=rngs)

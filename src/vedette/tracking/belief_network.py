@@ -92,7 +92,7 @@ class BeliefNetwork(LocalFilters):
         self, state: State, scans: Sequence[Any], poses: Any, time: float, *, rngs: Sequence[np.random.Generator]
     ) -> tuple[State, TrackerInfo]:
         """Filter each sensor's scan, send the beliefs and fuse those that have arrived; see `Tracker.step`."""
-        pose_array, dt = check_step(state, scans, poses, time, rngs, self)
+        pose_array, dt = check_step(state, scans, poses, time, rngs, self, len(self.filters))
         if dt == 0.0 and self.network.delay > 0:
             expected = f"one after that of the last scan, {time:g} s, as beliefs that are late would count again"
             raise reject("time", expected, time)

@@ -120,7 +120,7 @@ class Central(MultiSensorFilterTracker):
         self, state: State, scans: Sequence[Any], poses: Any, time: float, *, rngs: Sequence[np.random.Generator]
     ) -> tuple[State, TrackerInfo]:
         """Update the belief with all scans; see `Tracker.step`. Uses only `rngs[0]`."""
-        pose_array, dt = check_step(state, scans, poses, time, rngs, self)
+        pose_array, dt = check_step(state, scans, poses, time, rngs, self, len(self.sensors))
         timer, step = StageTimer(), state.step + 1
         with timer.timing("filter"):
             belief, info = self._filter(state.fused, state.memory, scans, pose_array, dt, step, rngs[0])

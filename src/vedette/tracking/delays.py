@@ -102,7 +102,7 @@ class DelayedScanTracker(TrackerWrapper):
 
         The delays of the scans of sensor s are drawn from `rngs[s]`.
         """
-        pose_array, _ = check_step(state, scans, poses, time, rngs, self)
+        pose_array, _ = check_step(state, scans, poses, time, rngs, self, len(self.sensors))
         memory, now = state.memory, real("time", time)
         seed = int(rngs[0].integers(2**32)) if memory.timeline is None else memory.seed
         tracker = OutOfSequenceTracker(self.tracker, pose_array, self._window, seed)

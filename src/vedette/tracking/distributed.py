@@ -72,7 +72,7 @@ class Distributed(LocalFilters):
         self, state: State, scans: Sequence[Any], poses: Any, time: float, *, rngs: Sequence[np.random.Generator]
     ) -> tuple[State, TrackerInfo]:
         """Filter each sensor's scan, then fuse the beliefs; see `Tracker.step`."""
-        pose_array, dt = check_step(state, scans, poses, time, rngs, self)
+        pose_array, dt = check_step(state, scans, poses, time, rngs, self, len(self.filters))
         step, timer, num, birth = state.step + 1, StageTimer(), len(self.filters), self.birth
         births: Sequence[LMB | None] = (None,) * num
         if birth.from_measurements is not None:

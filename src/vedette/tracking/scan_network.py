@@ -86,7 +86,7 @@ class ScanNetwork(MultiSensorFilterTracker):
         self, state: State, scans: Sequence[Any], poses: Any, time: float, *, rngs: Sequence[np.random.Generator]
     ) -> tuple[State, TrackerInfo]:
         """Send the scans and filter those that have arrived; see `Tracker.step`. Uses only `rngs[0]`."""
-        pose_array, dt = check_step(state, scans, poses, time, rngs, self)
+        pose_array, dt = check_step(state, scans, poses, time, rngs, self, len(self.sensors))
         timer, step, num = StageTimer(), state.step + 1, len(self.sensors)
         time_index = state.memory.time_index + (dt > 0.0)
         hops = hop_counts(self.network.links(pose_array, rngs[0]))
