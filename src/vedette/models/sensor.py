@@ -9,7 +9,7 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import ArrayLike
 
-from vedette.internal.unit_warnings import LARGE_ANGLE, warn_implausible
+from vedette.internal.unit_warnings import LARGE_ANGLE, suppress_unit_warnings, warn_implausible
 from vedette.kernels.base.types import Floats, Sensor
 from vedette.kernels.gaussian.detection import AT_CENTRE, AT_EDGES, BY_NODES, CLOSED_FORM, detection_probabilities
 from vedette.kernels.gaussian.position_integrals import spread_nodes
@@ -151,7 +151,10 @@ class SensorModel:
 @lru_cache(maxsize=1000)
 def with_default_detection_at(model: SensorModel, default: str) -> SensorModel:
     """Return the model with this `detection_at` if it has none; the same object for equal arguments."""
-    return model if model.detection_at is not None else replace(model, detection_at=default)
+    if model.detection_at is not None:
+        return model
+    with suppress_unit_warnings():  # those of the given model are enough
+        return replace(model, detection_at=default)
 
 
 @lru_cache(maxsize=1000)
