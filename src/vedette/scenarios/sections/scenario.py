@@ -209,6 +209,8 @@ class ScenarioModel(Section):
             best = LeastGospaEstimator() if by_gospa else LeastOspaEstimator()
             estimator = best if self.filter.built_kind == "factored_glmb" else MapEstimator()
         missing = [name for name in ("cutoff", "order") if getattr(estimator, name, 0.0) is None]
+        if not missing:
+            return estimator  # the section itself, by which faults find their place
         return estimator.model_copy(update={name: getattr(self.ospa, name) for name in missing})
 
     @property
