@@ -9,13 +9,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vedette.errors import InputError
+from vedette.scenarios.sections.tracking import FilterLimits
 
 PATTERNS = ("spread", "crowd")
 VIEWS = ("full", "limited")
 _MAX_SENSORS, _MAX_TARGETS = 1000, 2000
 
 NUM_STEPS = 60
-_DEFAULT_MAX_LABELS = 1000  # default of a filter whose file gives none
 _SIDE = 500.0  # m, side of the square that each sensor adds
 _GROUP_SIZE = 4  # targets that start or end at one place
 _SPEEDS = (3.0, 8.0)  # m/s
@@ -82,7 +82,7 @@ class GeneratedScene:
     def max_labels(self) -> int | None:
         """Number of labels that a filter needs for targets and two scans of clutter; None if the default is enough."""
         needed = self.total_targets + 2 * self.num_sensors
-        return needed if needed > _DEFAULT_MAX_LABELS else None
+        return needed if needed > FilterLimits().max_labels else None
 
     @property
     def side(self) -> float:

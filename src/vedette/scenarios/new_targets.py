@@ -28,7 +28,6 @@ _POINTS_PER_SIDE, _MAX_DETECTIONS = 5, 300
 _SETTLED = 30  # detections of each sensor after which the covariance hardly changes
 _ERROR = 2.0  # detections; of runs with 1e-6 to 1 births per scan
 _MIN_DETECTION = 0.1  # a place is covered if a sensor has this probability of detection there
-_WIDE = 3.0  # factor of the position std of a birth anywhere before its first detection, as in the filter
 
 
 class NewTargets(NamedTuple):
@@ -167,16 +166,19 @@ def _sources(model: ScenarioModel, nodes: Floats, num_scans: int) -> Iterator[_S
 
 def _needed(model: ScenarioModel, motion: MotionModel, source: _Source, views: Sequence[_View], rate: float) -> float:
     """Return the number of detections until the log odds of existence exceed 0; rate: 1/s, of them and of death."""
+    from vedette.kernels.steps.undetected import WIDE
     from vedette.models.probe import central_differences
 
     state, cov, number = source.mean, source.cov.copy(), float(source.steps.max())
     if source.steps.all():  # those born before and not yet detected
         number /= model.time.step_period * rate
     odds, due, now = math.log(number), np.zeros(len(views)), 0.0
+    assert isinstance(model.filter, Filter)  # see `new_targets`
+    floor = model.filter.limits.min_log_clutter
     if source.existence:
         odds = math.log(source.existence / (1.0 - source.existence))
     elif source.area:
-        cov[:2, :2] *= _WIDE**2
+        cov[:2, :2] *= WIDE**2
         odds += math.log(2.0 * math.pi / source.area) + 0.5 * float(np.linalg.slogdet(cov[:2, :2])[1])
     for detections in range(1, _MAX_DETECTIONS + 1):
         i = int(due.argmin())
@@ -197,7 +199,7 @@ def _needed(model: ScenarioModel, motion: MotionModel, source: _Source, views: S
         innovation = slope @ cov @ slope.T + noise
         clutter = plain(sensor.clutter.log_intensity)(expected, pose, sensor.clutter.params)
         # Log of the number of false measurements in the effective volume of the predicted density.
-        log_false = max(clutter, -60.0) + 0.5 * float(np.linalg.slogdet(2.0 * math.pi * innovation)[1])
+        log_false = max(clutter, floor) + 0.5 * float(np.linalg.slogdet(2.0 * math.pi * innovation)[1])
         if detections == 1:
             odds += math.log(chance) - log_false - (0.0 if source.area else 0.5 * dim)
         else:  # a false measurement may stand in for a missed one

@@ -141,12 +141,14 @@ def _chosen(pairs: _Pairs, unclaimed: Floats, least_logit: float, left_out: Floa
         for i in range(offsets[j], offsets[j + 1]):
             log_odds[j] = log_add(log_odds[j], pairs.log_odds[members[i]])
         left = log_odds[j] + unclaimed[j]
+        if left == -math.inf:
+            continue
         least = least_logit + (_LOG_WORTH if unclaimed[j] < _LOG_CLAIMED else 0.0)
-        if left > -math.inf and (left >= least or unclaimed[j] >= _LOG_FREE):
+        if left >= least or unclaimed[j] >= _LOG_FREE:
             kept[num_kept] = j
             num_kept += 1
             num_pairs += offsets[j + 1] - offsets[j]
-        elif left > -math.inf:
+        else:
             log_left_out += log_add(0.0, left)
             existence = 1.0 / (1.0 + math.exp(-left))
             for i in range(offsets[j], offsets[j + 1]):

@@ -196,10 +196,10 @@ def step_factored(
     missed, log_missed = missed_intensity(found.seen, scan, sensor, num, found.left_out)
     left, sums = left_in_cells(undetected, sensor, scan.pose), work.sums
     log_missed += left.changes[0] if len(left.changes) > 0 else 0.0
-    add_to_cells(left.tables, undetected.cells, undetected.places, found.left_out[num:])
+    add_to_cells(left.tables, background, undetected.places, found.left_out[num:])
     return (
         density,
-        with_returned(missed, left.tables, undetected.cells, background, found_faint(work)),
+        with_returned(missed, left.tables, background, found_faint(work)),
         left,
         FactoredReport(
             sums[TOTAL] + log_twice + log_missed + found.log_left_out,

@@ -22,7 +22,7 @@ from vedette.kernels.gaussian.components import (
     stacked_mixtures,
 )
 from vedette.kernels.gaussian.linalg import log_add
-from vedette.kernels.steps.undetected import Cells, Undetected, cell_at
+from vedette.kernels.steps.undetected import Undetected, cell_at
 
 # Far from all births, the density of undetected targets counts as this share of its largest value: a lost target is
 # kept down to a millionth of the odds of a new one.
@@ -66,10 +66,10 @@ def _site_density(sites: Floats, c: int, x: float, y: float, cov: Floats) -> tup
 
 
 @borrowing
-def _cell_density(background: Background, x: float, y: float) -> float:
-    grid, table = background.grid, background.table
-    cell = cell_at(x, y, grid[0], grid[1], grid[2], grid[3], int(grid[4]), len(table))
-    return table[cell] if cell >= 0 else 0.0
+def _cell_of(background: Background, place: Floats) -> int:
+    """Return the index of the cell of a place; -1 outside of the region, or without one."""
+    grid = background.grid
+    return cell_at(place[0], place[1], grid[0], grid[1], grid[2], grid[3], int(grid[4]), len(background.table))
 
 
 @borrowing
@@ -80,7 +80,8 @@ def outweighs_undetected(existence: float, mean: Floats, cov: Floats, background
 
     mean, cov: of the label.
     """
-    density, largest = _cell_density(background, mean[0], mean[1]), background.grid[5]
+    cell = _cell_of(background, mean)
+    density, largest = background.table[cell] if cell >= 0 else 0.0, background.grid[5]
     for c in range(len(background.sites)):
         own, peak = _site_density(background.sites, c, mean[0], mean[1], cov)
         density += own
@@ -102,9 +103,7 @@ def _nearest_site(background: Background, mean: Floats, cov: Floats) -> tuple[in
 
 
 @kernel
-def with_returned(
-    intensity: Mixture, tables: Floats, cells: Cells, background: Background, returned: Mixture
-) -> Mixture:
+def with_returned(intensity: Mixture, tables: Floats, background: Background, returned: Mixture) -> Mixture:
     """Return the intensity with further Gaussians; in a region, their expected numbers are added to its cells.
 
     A Gaussian near a component is merged with it, with the moments of both; far ones become components. The total
@@ -113,7 +112,6 @@ def with_returned(
     Args:
         intensity: undetected targets after the scan, by the components of the background.
         tables: (num_tables, num_cells) as in `Undetected`, after the scan; the first is written.
-        cells: the cells of the tables.
         background: undetected targets before the scan.
         returned: the Gaussians, weighted by their expected numbers.
     """
@@ -125,8 +123,9 @@ def with_returned(
     for k in range(len(returned.log_weights)):
         mean, weight = returned.means[k], math.exp(returned.log_weights[k])
         site, density = _nearest_site(background, mean, returned.covs[k])
-        if _cell_density(background, mean[0], mean[1]) > density:
-            add_to_cells(tables, cells, returned.means[k : k + 1], np.full(1, weight))
+        cell = _cell_of(background, mean)
+        if cell >= 0 and background.table[cell] > density:
+            tables[0, cell] += weight
         elif site >= 0:
             pair[0], pair[1], weights[0], weights[1] = site, num + k, math.exp(out.log_weights[site]), weight
             merge_components(out, pair, weights, 2, one, 0)
@@ -139,11 +138,9 @@ def with_returned(
 
 
 @kernel
-def add_to_cells(tables: Floats, cells: Cells, places: Floats, numbers: Floats) -> None:
+def add_to_cells(tables: Floats, background: Background, places: Floats, numbers: Floats) -> None:
     """Add expected numbers (num,) to the cells of places (num, state_dim) in the first table, if there is one."""
-    corner, size = cells.corner, cells.size
-    for k in range(len(places) if len(tables) > 0 else 0):
-        columns, num = cells.num_columns, tables.shape[1]
-        cell = cell_at(places[k, 0], places[k, 1], corner[0], corner[1], size[0], size[1], columns, num)
+    for k in range(len(places)):
+        cell = _cell_of(background, places[k])
         if cell >= 0:
             tables[0, cell] += numbers[k]
