@@ -108,6 +108,22 @@ def test_a_filter_in_python_warns_where_a_scenario_is_refused(
     assert (expected is None) == (every != 60)
 
 
+def test_labels_that_scans_reject_are_not_unconfirmed() -> None:
+    """Four sites before a sensor that sees them all, a scan at each step: a list is full, but no births are cut."""
+    targets, _ = models_of(0.06, 4)
+    clutter = models.region_clutter(20.0, models.Region(-500.0, 500.0, -500.0, 500.0), "position")
+    noise, detection = models.constant_noise([10.0, 10.0]), models.constant_detection(0.9)
+    local = DeltaGlmbFilter(targets, models.SensorModel(models.position(), noise, detection, clutter))
+    belief, rng = local.initial(), np.random.default_rng(0)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        for step in range(1, 16):
+            true = targets.birth.means[:, :2] + rng.normal(0.0, 10.0, (4, 2))
+            scan = np.concatenate([true, rng.uniform(-500.0, 500.0, (20, 2))])
+            belief, _ = local.step(belief, scan, np.zeros(3), 1.0, step, rng=rng)
+    assert belief.num_hyps == local.limits.max_hypotheses
+
+
 def test_births_per_step_never_warn() -> None:
     """Without a period births are meant per step, and a scenario is not refused."""
     assert first_warned(DeltaGlmbFilter(*models_of(0.01, 1, period=None)), 0.05, 40, 40) is None

@@ -38,8 +38,9 @@ class _GlmbFilterBase(LabelledFilterBase[GLMB]):
         if dt > 0.0 and self.targets.birth.period is not None and prior.num_hyps >= self.limits.max_hypotheses:
             born = expit(self._births(dt, step, None, births).existence_logit)
             existence, most = existence_probabilities(prior)[1], self.limits.max_hypotheses
-            # Labels of at most twice the probability of a birth are taken as unconfirmed.
-            labels = np.concatenate([born, existence[existence <= 2.0 * born.max(initial=0.0)]])
+            # Labels of about the probability of a birth are unconfirmed; a scan rejects or confirms the others.
+            least, largest = 0.5 * born.min(initial=1.0), 2.0 * born.max(initial=0.0)
+            labels = np.concatenate([born, existence[(existence >= least) & (existence <= largest)]])
             if cut_share(len(labels), float(labels.sum()) / max(len(labels), 1), most) > MAX_CUT_SHARE:
                 text = f"max_hypotheses: {most} hypotheses cut more than {100.0 * MAX_CUT_SHARE:g} % of the expected "
                 text += "births, as each site makes a label at each step until a scan confirms or rejects them; use "

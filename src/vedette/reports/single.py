@@ -42,10 +42,6 @@ def write_run_report(
     prepare_folder(target)
     group = group_of_run(record, scenario)
     (strategy,) = group.strategies
-    versions = None
-    if manifest is not None:
-        rows = tuple((str(name), str(number)) for name, number in manifest["versions"].items())
-        versions = Table("With what the run was made.", ("Part", "Version"), rows, is_words=True)
     page = render(
         "run.html",
         [{**replay_data(strategy, record, group.title, trust=trust), "typical": False}],
@@ -54,7 +50,12 @@ def write_run_report(
         section=section_of(group, "g0"),
         untrusted=() if trust else measurement_code(scenario),
         described=scenario.model.description,
-        versions=versions,
+        versions=None if manifest is None else _versions(manifest),
         citation="" if manifest is None else citation(manifest["versions"]["vedette"]),
     )
     write_page(target, page)
+
+
+def _versions(manifest: Mapping[str, Any]) -> Table:
+    rows = tuple((str(name), str(number)) for name, number in manifest["versions"].items())
+    return Table("With what the run was made.", ("Part", "Version"), rows, is_words=True)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 from functools import cache
+from pathlib import Path as FilePath
 from types import FunctionType
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -15,6 +16,7 @@ from vedette.kernels.base.types import Floats
 from vedette.scenarios.diagnostics import Path
 from vedette.scenarios.loading import Scenario
 from vedette.scenarios.sections import ScenarioModel
+from vedette.scenarios.sections.birth_labels import birth_probabilities
 from vedette.scenarios.sections.fusion import FULL_INFORMATION_FUSIONS, SINGLE_BELIEF_FUSIONS
 from vedette.scenarios.sections.tracking import UNLABELLED, Filter
 from vedette.scenarios.sections.undetected import has_intensity, undetected_anywhere
@@ -95,33 +97,15 @@ def new_targets(scenario: Scenario, num_scans: int | None = None) -> NewTargets 
         return None
     from vedette.models import CellGrid
 
-    region, num = model.region.build(), num_scans or model.time.num_steps
+    region, num, placed = model.region.build(), num_scans or model.time.num_steps, _placed(model, folder)
     motion, survival = model.motion.build(folder), model.survival.build(folder)
-    poses = [np.array(sensor.turning_pose, np.float64) for sensor in model.sensors]
-    periods = [scan * sensor.scans.steps(scan)[0] for sensor in model.sensors]
-    if model.recording is not None:
-        recording = model.recording.build(model, folder)
-        poses = list(recording.poses[len(recording.times) // 2])
-        numbers = np.array([[each is not None for each in scans] for scans in recording.scans]).sum(axis=0)
-        periods = (len(recording.times) * scan / np.maximum(numbers, 1)).tolist()
-    sensors = [sensor.build(region, model.filter.gaussian_method, folder) for sensor in model.sensors]
-
-    def views_of(state: Floats) -> list[_View]:
-        """Return the sensors that cover a place, the most frequent one first."""
-        views = [
-            _View(sensor, pose, chance, chance / period)
-            for sensor, pose, period in zip(sensors, poses, periods, strict=True)
-            if (chance := plain(sensor.detection.function)(state, pose, sensor.detection.params)) >= _MIN_DETECTION
-        ]
-        return sorted(views, key=lambda view: -view.rate)
-
     nodes = CellGrid(region, _POINTS_PER_SIDE, _POINTS_PER_SIDE).states(motion.state_dim, 1)[:, 0]
-    width = math.sqrt(region.area * np.mean([bool(views_of(node)) for node in nodes]))
+    width = math.sqrt(region.area * np.mean([bool(_views(placed, node)) for node in nodes]))
     is_moving = any(sensor.platform.top_speed > 0.0 for sensor in model.sensors)
     has_one_belief = model.fusion.kind in (*SINGLE_BELIEF_FUSIONS, *FULL_INFORMATION_FUSIONS)
     ends, rows = scan * np.arange(num, 0, -1), []
     for source in (each for each in _sources(model, nodes, num) if each.steps.any()):
-        views, options = views_of(source.mean), []
+        views, options = _views(placed, source.mean), []
         death = (1.0 - plain(survival.function)(source.mean, scan, survival.params)) / scan
         speed = 0.0 if is_moving else math.hypot(*source.mean[2:4], *np.sqrt(np.diag(source.cov)[2:4]))
         lasts = min(1.0 / death if death else math.inf, width / speed if speed else math.inf)
@@ -145,12 +129,37 @@ class _View(NamedTuple):
     rate: float  # detections per second
 
 
+_Placed = tuple["SensorModel", Floats, float]  # a sensor, its pose, and seconds from scan to scan
+
+
+def _placed(model: ScenarioModel, folder: FilePath) -> list[_Placed]:
+    """Return the sensors at their first poses, or at those in the middle of a recording."""
+    scan, region, method = model.time.step_period, model.region.build(), model.filter.gaussian_method
+    poses = [np.array(sensor.turning_pose, np.float64) for sensor in model.sensors]
+    periods = [scan * sensor.scans.steps(scan)[0] for sensor in model.sensors]
+    if model.recording is not None:
+        recording = model.recording.build(model, folder)
+        poses = list(recording.poses[len(recording.times) // 2])
+        numbers = np.array([[each is not None for each in scans] for scans in recording.scans]).sum(axis=0)
+        periods = (len(recording.times) * scan / np.maximum(numbers, 1)).tolist()
+    return list(zip((each.build(region, method, folder) for each in model.sensors), poses, periods, strict=True))
+
+
+def _views(placed: Sequence[_Placed], state: Floats) -> list[_View]:
+    """Return the sensors that cover a place, the most frequent one first."""
+    views = [
+        _View(sensor, pose, chance, chance / period)
+        for sensor, pose, period in placed
+        if (chance := plain(sensor.detection.function)(state, pose, sensor.detection.params)) >= _MIN_DETECTION
+    ]
+    return sorted(views, key=lambda view: -view.rate)
+
+
 def _sources(model: ScenarioModel, nodes: Floats, num_scans: int) -> Iterator[_Source]:
     """Yield births at the sites, and around the nodes of the region."""
     birth, scan = model.birth.build(model.motion, model.region), model.time.step_period
     active = np.array([birth.is_active(step) for step in range(1, num_scans + 1)], np.float64)
-    for existence, mean, cov in zip(birth.existence, birth.means, birth.covs, strict=True):
-        number = -math.expm1(math.log1p(-existence) * (scan / birth.period if birth.period else 1.0))
+    for number, mean, cov in zip(birth_probabilities(model), birth.means, birth.covs, strict=True):
         yield _Source(mean, cov, number * active, 0.0)
     measured, anywhere = birth.from_measurements, undetected_anywhere(model, birth)
     if measured is None:
@@ -167,7 +176,6 @@ def _sources(model: ScenarioModel, nodes: Floats, num_scans: int) -> Iterator[_S
 def _needed(model: ScenarioModel, motion: MotionModel, source: _Source, views: Sequence[_View], rate: float) -> float:
     """Return the number of detections until the log odds of existence exceed 0; rate: 1/s, of them and of death."""
     from vedette.kernels.steps.undetected import WIDE
-    from vedette.models.probe import central_differences
 
     state, cov, number = source.mean, source.cov.copy(), float(source.steps.max())
     if source.steps.all():  # those born before and not yet detected
@@ -187,17 +195,9 @@ def _needed(model: ScenarioModel, motion: MotionModel, source: _Source, views: S
         if detections == 1 and source.existence:
             continue
         if dt > 0.0:
-            slope = central_differences(plain(motion.transition), (state, dt, motion.transition_params), cov.shape, 0)
-            noise, now = np.empty_like(cov), now + dt
-            plain(motion.process_noise_cov)(state, dt, motion.noise_params, noise)
-            cov = slope @ cov @ slope.T + noise
-        dim, measurement = sensor.meas_dim, sensor.measurement
-        args, expected, noise = (state, pose, measurement.params), np.empty(dim), np.empty((dim, dim))
-        plain(measurement.function)(*args, expected)
-        plain(sensor.noise.function)(state, pose, sensor.noise.params, noise)
-        slope = central_differences(plain(measurement.function), args, (dim, len(state)), measurement.angular)
-        innovation = slope @ cov @ slope.T + noise
-        clutter = plain(sensor.clutter.log_intensity)(expected, pose, sensor.clutter.params)
+            cov, now = _predicted(motion, state, cov, dt), now + dt
+        slope, noise, clutter = _measured(sensor, state, pose)
+        dim, innovation = sensor.meas_dim, slope @ cov @ slope.T + noise
         # Log of the number of false measurements in the effective volume of the predicted density.
         log_false = max(clutter, floor) + 0.5 * float(np.linalg.slogdet(2.0 * math.pi * innovation)[1])
         if detections == 1:
@@ -213,6 +213,28 @@ def _needed(model: ScenarioModel, motion: MotionModel, source: _Source, views: S
             return float(detections)
         cov = cov - cov @ slope.T @ np.linalg.solve(innovation, slope @ cov)
     return math.inf
+
+
+def _predicted(motion: MotionModel, state: Floats, cov: Floats, dt: float) -> Floats:
+    """Return the covariance of a state `dt` seconds later."""
+    from vedette.models.probe import central_differences
+
+    slope = central_differences(plain(motion.transition), (state, dt, motion.transition_params), cov.shape, 0)
+    noise = np.empty_like(cov)
+    plain(motion.process_noise_cov)(state, dt, motion.noise_params, noise)
+    return slope @ cov @ slope.T + noise
+
+
+def _measured(sensor: SensorModel, state: Floats, pose: Floats) -> tuple[Floats, Floats, float]:
+    """Return the Jacobian of a measurement, the covariance of its noise, and the log clutter intensity there."""
+    from vedette.models.probe import central_differences
+
+    dim, function, angular = sensor.meas_dim, plain(sensor.measurement.function), sensor.measurement.angular
+    args, expected, noise = (state, pose, sensor.measurement.params), np.empty(dim), np.empty((dim, dim))
+    function(*args, expected)
+    plain(sensor.noise.function)(state, pose, sensor.noise.params, noise)
+    slope = central_differences(function, args, (dim, len(state)), angular)
+    return slope, noise, plain(sensor.clutter.log_intensity)(expected, pose, sensor.clutter.params)
 
 
 @cache

@@ -115,15 +115,9 @@ def births_from_scans(
     scanned = [s for s, scan in enumerate(scans) if scan is not None]
     checked = [pose_vector("pose", poses[s]) for s in scanned]
     if len(scanned) == 1:
-        sensor, lmb = sensors[scanned[0]], _as_kernel(belief)
-        scan = _scan_input(lmb, sensor, scans[scanned[0]], checked[0])
-        states = sensor.measurement.states_at(scan.measurements, scan.pose, len(parameters.std))
-        models = sensor.to_kernel(), _truncation(sensor.meas_dim)
-        with model_errors():
-            births = LMB.from_kernel(births_unexplained(lmb, scan, states, *models, MIN_UNEXPLAINED, parameters))
+        births = _births_of_single_sensor(belief, sensors[scanned[0]], scans[scanned[0]], checked[0], parameters)
     else:
-        pool = unexplained_measurements(model, belief, sensors, scans, poses)
-        births = LMB.from_kernel(births_of_measurements(pool.states, pool.probabilities, parameters))
+        births = _births_of_pool(unexplained_measurements(model, belief, sensors, scans, poses), parameters)
     births = with_velocities(births, model.std, sensors, scans, poses)
     return at_scan_time(births, checked)
 
@@ -200,6 +194,18 @@ def _unexplained_by_sensor(
     return UnexplainedMeasurements(states, 1.0 - explained[indices], np.full(len(indices), number))
 
 
+def _births_of_single_sensor(
+    belief: LabelledDensity, sensor: SensorModel, scan: Any, pose: Floats, parameters: BirthsOfMeasurements
+) -> LMB:
+    """Return the birth candidates from the scan of a single sensor."""
+    lmb = _as_kernel(belief)
+    scan_input = _scan_input(lmb, sensor, scan, pose)
+    states = sensor.measurement.states_at(scan_input.measurements, scan_input.pose, len(parameters.std))
+    models = sensor.to_kernel(), _truncation(sensor.meas_dim)
+    with model_errors():
+        return LMB.from_kernel(births_unexplained(lmb, scan_input, states, *models, MIN_UNEXPLAINED, parameters))
+
+
 @cache
 def _truncation(meas_dim: int) -> Truncation:
     """Return the default gates and clutter floor of filters."""
@@ -266,3 +272,7 @@ class _Cells:
     def _cell(self, place: Floats) -> tuple[float, float]:
         x, y = np.floor(place / self._size).tolist()
         return x, y
+
+
+def _births_of_pool(measurements: UnexplainedMeasurements, parameters: BirthsOfMeasurements) -> LMB:
+    return LMB.from_kernel(births_of_measurements(measurements.states, measurements.probabilities, parameters))

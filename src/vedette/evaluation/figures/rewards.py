@@ -68,16 +68,7 @@ def reward_figure(plan: Plan, *, pair: tuple[int, int] | None = None, scene: Sce
     figure = new_figure((COLUMN_WIDTH + 1.4 if joint else 2.3) + 1.9 * (len(groups) - 1))
     panels = figure.subplots(len(heights), 1, height_ratios=heights, squeeze=False)[:, 0]
     if joint and pair is not None:
-        heat, reward = panels[0], best_over_pair(joint[0], pair)
-        image = heat.imshow(reward.T, origin="lower", cmap=HEAT_MAP, aspect="auto", interpolation="nearest")
-        heat.grid(False)
-        for axis, sensor in zip((heat.xaxis, heat.yaxis), pair, strict=True):
-            map_ticks(axis, action_axes[sensor], 7)
-            axis.set_label_text(action_axes[sensor].title(scene.name(sensor)))
-        column, row = plan.chosen[pair[0]], plan.chosen[pair[1]]
-        for shade, width in (("black", 2.6), ("white", 1.2)):  # legible on the dark and on the light end of the scale
-            heat.add_patch(Rectangle((column - 0.5, row - 0.5), 1, 1, fill=False, edgecolor=shade, linewidth=width))
-        figure.colorbar(image, ax=heat, label=scene.reward_title("Joint reward").replace(" (", "\n("))
+        _draw_heat_map(figure, panels[0], plan, joint[0], pair, action_axes, scene)
     for axes, sensors in zip(panels[-len(groups) :], groups, strict=True):
         _draw_curves(
             axes, plan, {sensor: action_axes[sensor] for sensor in sensors}, scene, sensor_styles(sensors_shown)
@@ -198,3 +189,24 @@ def best_over_pair(table: RewardTable, pair: tuple[int, int]) -> Floats:
     others = tuple(axis for axis in range(table.mean.ndim) if axis not in positions)
     reward = np.fmax.reduce(table.mean, axis=others) if others else table.mean
     return reward.T if positions[0] > positions[1] else reward
+
+
+def _draw_heat_map(
+    figure: Figure,
+    axes: Axes,
+    plan: Plan,
+    table: RewardTable,
+    pair: tuple[int, int],
+    along: Mapping[int, ActionAxis],
+    scene: Scene,
+) -> None:
+    reward = best_over_pair(table, pair)
+    image = axes.imshow(reward.T, origin="lower", cmap=HEAT_MAP, aspect="auto", interpolation="nearest")
+    axes.grid(False)
+    for axis, sensor in zip((axes.xaxis, axes.yaxis), pair, strict=True):
+        map_ticks(axis, along[sensor], 7)
+        axis.set_label_text(along[sensor].title(scene.name(sensor)))
+    column, row = plan.chosen[pair[0]], plan.chosen[pair[1]]
+    for shade, width in (("black", 2.6), ("white", 1.2)):  # legible on the dark and on the light end of the scale
+        axes.add_patch(Rectangle((column - 0.5, row - 0.5), 1, 1, fill=False, edgecolor=shade, linewidth=width))
+    figure.colorbar(image, ax=axes, label=scene.reward_title("Joint reward").replace(" (", "\n("))

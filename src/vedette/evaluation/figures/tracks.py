@@ -116,10 +116,7 @@ def overview_figure(
         minus = f"minus {short_label(comparison.strategies[0])}"
         right.set_ylabel(f"{named_in('OSPA', comparison.unit)} {minus}")
         above = figure.add_subplot(grid[0, 1])
-        draw_ospa(above, comparison, "total")
-        above.set_ylabel(named_in("OSPA", comparison.unit), fontsize=6)
-        above.tick_params(labelsize=6)
-        above.yaxis.set_major_locator(MaxNLocator(3))
+        _draw_error(above, comparison)
     else:
         draw_ospa(right, comparison, "total")
         right.set_xlabel("Time (s)")
@@ -128,6 +125,14 @@ def overview_figure(
     above.legend(handles, labels, loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=columns, frameon=False)
     add_legend(figure, record, scene, shade)
     return figure
+
+
+def _draw_error(axes: Axes, comparison: Comparison) -> None:
+    """Draw the error over the whole run, small."""
+    draw_ospa(axes, comparison, "total")
+    axes.set_ylabel(named_in("OSPA", comparison.unit), fontsize=6)
+    axes.tick_params(labelsize=6)
+    axes.yaxis.set_major_locator(MaxNLocator(3))
 
 
 def draw_tracks(axes: Axes, record: RunRecord, scale: float, scene: Scene, shade: str = "") -> None:
