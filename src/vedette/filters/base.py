@@ -81,13 +81,19 @@ class WithBirths(SummaryRepr):
     targets: TargetModel
     limits: Limits
 
-    def step_limits(self, sensor: SensorModel) -> Limits:
-        """Return the limits of an update with a scan of a sensor."""
+    def limits_of(self, sensor: SensorModel) -> Limits:
+        """Return the limits of an update with a scan of a sensor; see `step_limits`."""
         return limits_for_births(self.limits, self.targets.birth, sensor.clutter.rate)
 
     def _births(self, dt: float, step: Any, prior: LabelledDensity | None, births: LMB | None) -> Lmb:
         """Return the labels born within the `dt` seconds before a step, detected or not; see `births_for`."""
         return births_for(self.targets.birth, dt, step, prior, births)
+
+
+@lru_cache(maxsize=1000)
+def step_limits(local: WithBirths, sensor: SensorModel) -> Limits:
+    """Return the limits of an update of a filter with a scan of a sensor, cached."""
+    return local.limits_of(sensor)
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
@@ -251,7 +257,7 @@ class LabelledFilter(SingleSensorFilter, LabelledFilterBase[BeliefT]):
         place: str,
     ) -> tuple[BeliefT, FilterInfo]:
         try:
-            step = SensorStep(inputs, self.step_limits(self.sensor), self.sensor, rng=rng)
+            step = SensorStep(inputs, step_limits(self, self.sensor), self.sensor, rng=rng)
             posterior, report = self._run_kernel(prior, step)
         except Exception as error:
             raise_model_error(error)

@@ -90,8 +90,8 @@ class _FactoredFilterBase(LabelledFilterBase[FactoredGLMB]):
     def _none(self) -> UndetectedTargets:
         return UndetectedTargets.none(self.targets.state_dim, self.targets.num_classes)
 
-    def step_limits(self, sensor: SensorModel) -> Limits:
-        return self.limits if self.births == "poisson" else LabelledFilterBase.step_limits(self, sensor)
+    def limits_of(self, sensor: SensorModel) -> Limits:
+        return self.limits if self.births == "poisson" else LabelledFilterBase.limits_of(self, sensor)
 
     def _births(self, dt: float, step: Any, prior: LabelledDensity | None, births: LMB | None) -> Lmb:
         if self.births == "labelled" or births is not None:

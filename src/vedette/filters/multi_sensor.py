@@ -11,7 +11,15 @@ import numpy as np
 
 from vedette.densities import LMB, LabelledDensity
 from vedette.errors import InputError
-from vedette.filters.base import NO_POSE, NO_SCAN, BeliefT, LabelledFilterBase, SensorStep, blind_sensor
+from vedette.filters.base import (
+    NO_POSE,
+    NO_SCAN,
+    BeliefT,
+    LabelledFilterBase,
+    SensorStep,
+    blind_sensor,
+    step_limits,
+)
 from vedette.filters.inputs import check_belief, check_scan, is_zero_duration, model_errors, no_births_for_kernel
 from vedette.filters.limits import Limits
 from vedette.filters.protocols import FilterInfo
@@ -163,7 +171,7 @@ class SequentialUpdate(MultiSensorFilter[BeliefT]):
         reports, log_total, last = list[Any](), 0.0, len(taken.names) - 1
         given = zip(taken.names, taken.sensors, taken.sequential_inputs(born, dt), strict=True)
         for s, (name, sensor, scan) in enumerate(given):
-            limits = self.step_limits(sensor) if s == last else keeping
+            limits = step_limits(self, sensor) if s == last else keeping
             own = sensor.to_kernel(), limits.truncation(sensor.meas_dim)
             step = SensorStep((scan, motion if s == 0 else None, *own), limits, sensor, len(taken.names))
             with model_errors():

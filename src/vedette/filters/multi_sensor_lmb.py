@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from vedette.densities import LMB
+from vedette.filters.base import step_limits
 from vedette.filters.inputs import model_errors
 from vedette.filters.lmb import LmbFilterBase
 from vedette.filters.multi_sensor import MultiSensorFilter, SensorScans
@@ -39,7 +40,7 @@ class MultiSensorLmbFilter(LmbFilterBase, MultiSensorFilter[LMB]):
     """
 
     def _updated(self, prior: Lmb, born: Lmb, taken: SensorScans, dt: float, place: str) -> tuple[LMB, FilterInfo]:
-        limits, num_columns, reports = self.step_limits(self.sensors[0]), 0, []
+        limits, num_columns, reports = step_limits(self, self.sensors[0]), 0, []
         motion, before = self._motion(dt), prior
         reduction = limits.reduction()
         with model_errors():

@@ -11,7 +11,7 @@ import numpy as np
 
 from vedette.densities import IidCluster, MultiBernoulli, Poisson
 from vedette.errors import NumericalError
-from vedette.filters.base import SingleSensorFilter, StepInputs
+from vedette.filters.base import SingleSensorFilter, StepInputs, step_limits
 from vedette.filters.inputs import check_belief, check_scan, model_errors
 from vedette.filters.protocols import FilterInfo
 from vedette.kernels.steps.cbmember import step_cb_member
@@ -84,7 +84,7 @@ class PhdFilter(UnlabelledFilter[Poisson]):
     kind: ClassVar[type[Poisson]] = Poisson
 
     def _updated(self, prior: Poisson, inputs: StepInputs, place: str) -> tuple[Poisson, FilterInfo]:
-        posterior, report = step_phd(prior.to_kernel(), *inputs, self.step_limits(self.sensor).intensity_caps())
+        posterior, report = step_phd(prior.to_kernel(), *inputs, step_limits(self, self.sensor).intensity_caps())
         log_likelihood = report.log_total + report.log_clutter - self.sensor.clutter.rate
         num, most = len(posterior.log_weights), self.limits.max_intensity_components
         return Poisson.from_kernel(posterior), self._info(report, num, most, log_likelihood, 0.0)
@@ -105,7 +105,7 @@ class CphdFilter(UnlabelledFilter[IidCluster]):
 
     def _updated(self, prior: IidCluster, inputs: StepInputs, place: str) -> tuple[IidCluster, FilterInfo]:
         log_cardinality, mixture = prior.to_kernel()
-        caps = self.step_limits(self.sensor).intensity_caps()
+        caps = step_limits(self, self.sensor).intensity_caps()
         cardinality, posterior, report = step_cphd(log_cardinality, mixture, *inputs, caps)
         if report.log_total == -math.inf:
             raise NumericalError(f"{place}no number of targets can have given this scan; do the models forbid it?")
@@ -130,7 +130,7 @@ class CbMemberFilter(UnlabelledFilter[MultiBernoulli]):
     kind: ClassVar[type[MultiBernoulli]] = MultiBernoulli
 
     def _updated(self, prior: MultiBernoulli, inputs: StepInputs, place: str) -> tuple[MultiBernoulli, FilterInfo]:
-        limits = self.step_limits(self.sensor)
+        limits = step_limits(self, self.sensor)
         posterior, report = step_cb_member(prior.to_kernel(), *inputs, limits.reduction(), limits.max_existence_logit)
         info = self._info(report, len(posterior.existence_logit), limits.max_labels, math.nan, math.nan)
         return MultiBernoulli.from_kernel(posterior), replace(info, dropped_existence=float(report.dropped_existence))

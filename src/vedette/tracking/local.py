@@ -123,7 +123,7 @@ class LocalFilters:
         """Return the belief without the labels that the limits of the first filter drop."""
         local = self.filters[0]
         assert isinstance(local, SingleSensorFilter)
-        return local.step_limits(local.sensor).kept(belief)
+        return local.limits_of(local.sensor).kept(belief)
 
     def _as_filter_density(self, belief: Any) -> Any:
         """Return the density in the form of the filters: a product of GLMBs if they use these."""
