@@ -109,7 +109,7 @@ def test_a_run_that_stops_at_once_writes_nothing(scenario_file, tmp_path, monkey
 
 def test_a_run_ends_with_its_health(scenario_file):
     result = call("run", scenario_file, "--planner", "stationary")
-    assert result.stdout.splitlines()[-1] == "diagnostics no problem found"
+    assert result.stdout.splitlines()[-1] == "diagnostics no limit reached, nothing truncated"
 
 
 def test_run_without_a_folder_writes_nothing(scenario_file, tmp_path):

@@ -8,14 +8,15 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from vedette.campaigns.results import CampaignResults, GroupComparison
+    from vedette.evaluation.fit import Fit
     from vedette.scenarios import Scenario
     from vedette.simulation.records import RunRecord
 
 
-def run_document(record: RunRecord, scenario: Scenario | None) -> dict[str, Any]:
+def run_document(record: RunRecord, scenario: Scenario | None, fit: Fit | None = None) -> dict[str, Any]:
     """Return the document of a run: scans, decisions, mean OSPA over the scans that count, run times, diagnostics.
 
-    Without the scenario, OSPA has no unit and sensors have numbers.
+    Without the scenario, OSPA has no unit and sensors have numbers. fit: of the model to recorded scans.
     """
     from vedette.evaluation.comparison import counted_scans, decided_actions
     from vedette.evaluation.diagnostics import record_diagnostics
@@ -50,6 +51,7 @@ def run_document(record: RunRecord, scenario: Scenario | None) -> dict[str, Any]
         "diagnostics": [
             {"name": each.name, "level": each.level, "text": each.text} for each in record_diagnostics(record, scenario)
         ],
+        "fit": None if fit is None else fit.to_dict(),
     }
 
 

@@ -76,13 +76,15 @@ def _check_options(export: Path | None, formats: Sequence[str], tex: Path | None
 
 def _show_run(folder: Path, tex: Path | None) -> tuple[RunRecord, dict[str, Any], list[Path]]:
     """Print a saved run; return it, its document, and no files."""
-    from vedette.simulation.storage import load_run
+    from vedette.evaluation.fit import Fit
+    from vedette.simulation.storage import load_run, read_manifest
 
     record, scenario = load_run(folder), _load_scenario(folder)
+    fit = Fit.from_dict(read_manifest(folder).get("fit"))
     if tex is not None:
         raise usage_error(f"expected of a campaign; {folder} holds a single run", "--tex")
-    print_run(record, scenario)
-    return record, run_document(record, scenario), []
+    print_run(record, scenario, fit)
+    return record, run_document(record, scenario, fit), []
 
 
 def _show_campaign(folder: Path, tex: Path | None) -> tuple[CampaignResults, dict[str, Any], list[Path]]:

@@ -5,25 +5,31 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from vedette.cli.output import console as new_console
 from vedette.cli.output import is_verbose
 from vedette.internal.text import pluralise, with_unit
+from vedette.kernels.base.types import Bools
 
 if TYPE_CHECKING:
     from rich.console import Console
 
+    from vedette.evaluation.fit import Fit
     from vedette.scenarios import Scenario
     from vedette.simulation.records import RunRecord
 
+_NEAR_CUTOFF = 0.8  # share of the cutoff of OSPA above which the estimates are hardly of the targets
 _SHOWN_SECONDS = 0.005  # shortest time of a stage that is shown
 _FEW_DECISIONS = 5  # printed without --verbose
 _LONGEST_ACTIONS = 36  # letters; longer actions are printed only with --verbose
 
 
-def print_run(record: RunRecord, scenario: Scenario | None) -> None:
+def print_run(record: RunRecord, scenario: Scenario | None, fit: Fit | None = None, num_warnings: int = 0) -> None:
     """Print the summary of a run; with `--verbose` all decisions and diagnostics.
 
-    Without the scenario, OSPA has no unit and sensors have numbers.
+    Without the scenario, OSPA has no unit and sensors have numbers. fit: of the model to recorded scans. num_warnings:
+    shown before.
     """
     console = new_console()
     console.print(_title(record, scenario), style="bold", soft_wrap=True)
@@ -31,6 +37,10 @@ def print_run(record: RunRecord, scenario: Scenario | None) -> None:
         _print_decisions(console, record)
     _print_facts(console, record, scenario)
     _print_diagnostics(console, record, scenario)
+    if fit is not None:
+        first, *others = fit.lines(num_warnings)
+        for head, line in (("fit        ", first), *(("           ", line) for line in others)):
+            console.print(f"{head} {'! ' if fit.findings else ''}{line}", soft_wrap=True)
 
 
 def _title(record: RunRecord, scenario: Scenario | None) -> str:
@@ -85,7 +95,8 @@ def _print_facts(console: Console, record: RunRecord, scenario: Scenario | None)
     if not math.isnan(total):
         parts = f"localisation {localisation:.2f}, cardinality {cardinality:.2f}"
         window = f"mean over t = {times[0]:g} to {times[-1]:g} s"
-        console.print(f"mean OSPA   {with_unit(f'{total:.2f}', unit)} ({parts}; {window})", soft_wrap=True)
+        far = "" if scenario is None else _far_words(record, scenario, counts, total)
+        console.print(f"mean OSPA   {with_unit(f'{total:.2f}', unit)} ({far}{parts}; {window})", soft_wrap=True)
     seconds_by_stage = {stage: float(seconds.sum()) for stage, seconds in record.timings.items()}
     stages = ", ".join(
         f"{stage} {seconds:.2f}" for stage, seconds in seconds_by_stage.items() if seconds >= _SHOWN_SECONDS
@@ -95,14 +106,27 @@ def _print_facts(console: Console, record: RunRecord, scenario: Scenario | None)
     )
 
 
+def _far_words(record: RunRecord, scenario: Scenario, counts: Bools, total: float) -> str:
+    """Return the cutoff and the share of targets without an estimate within it, if OSPA is near its cutoff."""
+    cutoff = scenario.model.ospa.cutoff
+    if total < _NEAR_CUTOFF * cutoff:
+        return ""
+    near = list[bool]()
+    for k in np.flatnonzero(counts).tolist():
+        means = record.estimates[k].means[:, :2]
+        near += [bool((np.hypot(*(means - state[:2]).T) < cutoff).any()) for state in record.truth.at(k)[1]]
+    far = f"{1.0 - np.mean(near):.0%}".replace("%", " %") if near else "none"
+    return f"cutoff {with_unit(f'{cutoff:g}', scenario.model.ospa.unit)}: {far} of targets have no estimate within it; "
+
+
 def _print_diagnostics(console: Console, record: RunRecord, scenario: Scenario | None) -> None:
     """Print the diagnostics that may reduce accuracy; with `--verbose` also notes."""
-    from vedette.evaluation.diagnostics import record_diagnostics
+    from vedette.evaluation.diagnostics import diagnostics_line, record_diagnostics
 
     diagnostics = record_diagnostics(record, scenario)
     shown = [each for each in diagnostics if each.level == "check" or (is_verbose() and each.level == "note")]
     if not shown:
-        console.print("diagnostics no problem found")
+        console.print(f"diagnostics {diagnostics_line(())}")
         return
     console.print("diagnostics, which may cost accuracy (docs: lost-tracks):")
     for each in shown:

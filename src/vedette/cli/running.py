@@ -115,6 +115,7 @@ def run(
     trust: Trust = False,
 ) -> None:
     """Run a scenario once: tracks, decisions with their rewards, errors, figures."""
+    from vedette.evaluation.fit import fit_of_run
     from vedette.scenarios import load_scenario
     from vedette.scenarios.dumping import dump_stored
     from vedette.simulation.storage import check_target, save_run
@@ -122,19 +123,21 @@ def run(
     loaded = load_scenario(scenario)
     check_planner(loaded, planner, "--planner")
     CodeTrust(trust)(loaded)
-    print_warnings(loaded)
+    warnings = print_warnings(loaded)
     if out is not None:
         require_packages("vedette run --out", "matplotlib", "pyarrow")
         with option_errors({"directory": "--out"}):
             check_target(out, overwrite)
     with interruptible("nothing was written"):
         record, stop = _simulate(loaded, planner, seed, run_number, threads)
-        print_run(record, loaded)
-        print_recording_warnings(record, loaded)
+        fit = None if loaded.model.recording is None else fit_of_run(record, loaded)
+        print_run(record, loaded, fit, len(warnings))
         saved_to = out if stop is None or not _has_complete_run(out) else None
         if saved_to is not None:
-            save_run(record, saved_to, scenario_text=dump_stored(loaded), overwrite=overwrite)
-    emit_json({**run_document(record, loaded), "folder": saved_to})
+            save_run(
+                record, saved_to, scenario_text=dump_stored(loaded), fit=fit and fit.to_dict(), overwrite=overwrite
+            )
+    emit_json({**run_document(record, loaded, fit), "folder": saved_to})
     if stop is not None and saved_to is None:
         end_stopped(stop, "nothing was written" if out is None else f"{out} keeps the whole run that was there")
     if out is not None:
@@ -173,19 +176,6 @@ def end_stopped(stop: RunStopped | RunInterrupted, consequence: str) -> NoReturn
     echo_error(str(stop))
     echo_error(consequence)
     raise typer.Exit(INTERRUPTED if isinstance(stop, KeyboardInterrupt) else 1) from None
-
-
-def print_recording_warnings(record: RunRecord, scenario: Scenario) -> tuple[str, ...]:
-    """Print and return warnings on a recording: sensors that share no target, and targets too fast for its tracks."""
-    if scenario.model.recording is None:
-        return ()
-    from vedette.evaluation.sensor_agreement import disagreement_warnings
-    from vedette.evaluation.unexplained_courses import unexplained_course_warnings
-
-    warnings = (*disagreement_warnings(record, scenario), *unexplained_course_warnings(record, scenario))
-    for line in warnings:
-        note(f"warning: {line}")
-    return warnings
 
 
 def _draw_run(record: RunRecord, scenario: Scenario, folder: Path) -> None:

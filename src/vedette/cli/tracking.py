@@ -15,12 +15,13 @@ from vedette.cli.errors import option_errors, usage_error
 from vedette.cli.options import BAD_ROWS, BadRows, Overwrite, ScansFile, SensorsFile, Speed, Trust
 from vedette.cli.output import bar, echo, emit_json, note
 from vedette.cli.run_summary import print_run
-from vedette.cli.running import CodeTrust, end_stopped, interruptible, print_recording_warnings
+from vedette.cli.running import CodeTrust, end_stopped, interruptible
 from vedette.cli.scenario_files import note_assumptions, print_warnings
 from vedette.internal.extras import without
 from vedette.internal.text import pluralise
 
 if TYPE_CHECKING:
+    from vedette.evaluation.fit import Fit
     from vedette.evaluation.joining import Join
     from vedette.recorded import RecordedScans
     from vedette.scenarios import Scenario
@@ -71,6 +72,8 @@ def track(
     Prints tracks and diagnostics, and errors if the targets' own reports are given. --out writes tracks, tables and
     figures.
     """
+    from vedette.evaluation.fit import fit_of_run
+
     _check_output(formats or (), out, overwrite)
     recorded, warnings = read_recording(sensors, scans, truth, speed=speed, bad_rows=bad_rows, trust=trust)
     scenario, recording, assumed = recorded
@@ -82,17 +85,17 @@ def track(
     written: list[Path] = []
     with interruptible("nothing was written"):
         record = _run_tracker(scenario, recording)
-        print_run(record, scenario)
-        warnings += print_recording_warnings(record, scenario)
+        fit = fit_of_run(record, scenario)
+        print_run(record, scenario, fit, len(warnings))
         joins = _print_tracks(record, recorded, scans, join)
         if out is not None:
-            written = _save(record, scenario, out, formats, joins, overwrite=overwrite)
+            written = _save(record, scenario, fit, out, formats, joins, overwrite=overwrite)
     if out is not None:
         _draw(record, scenario, out)
         echo(f"Wrote {out}: {', '.join(_contents(out, written))}")
     origin = {"assumptions": assumed, "skipped": recording.skipped, "warnings": warnings}
     joined = [join._asdict() for join in joins]
-    emit_json({**run_document(record, scenario), **origin, "joins": joined, "folder": out, "written": written})
+    emit_json({**run_document(record, scenario, fit), **origin, "joins": joined, "folder": out, "written": written})
 
 
 def _check_output(formats: Sequence[str], out: Path | None, overwrite: bool) -> None:
@@ -125,6 +128,7 @@ def _run_tracker(scenario: Scenario, recording: RecordedScans) -> RunRecord:
 def _save(
     record: RunRecord,
     scenario: Scenario,
+    fit: Fit,
     out: Path,
     formats: Sequence[str] | None,
     joins: Sequence[Join],
@@ -139,7 +143,7 @@ def _save(
     if missing_package := without("vedette track --out: a folder of results", "pyarrow"):
         note(f"{missing_package}; the tracks are written without it")
     else:
-        save_run(record, out, scenario_text=dump_stored(scenario), overwrite=overwrite)
+        save_run(record, out, scenario_text=dump_stored(scenario), fit=fit.to_dict(), overwrite=overwrite)
     default_formats = ("csv", "geojson") if scenario.model.origin is not None else ("csv",)
     written = [out / "tracks" / f"tracks.{name}" for name in dict.fromkeys(formats or default_formats)]
     table = table_of_run(record, scenario, joins)

@@ -23,6 +23,8 @@ _MIN_SCANS, _MIN_SHARE = 3, 0.25  # scans, and their share, at which a sensor mu
 _MIN_PAIRS, _MAX_CHANCE_SHARE = 10, 0.1  # fewest pairs for a result, and the largest share that agrees by chance
 _MAX_OFFSET_VARIATION = 0.25  # largest variation of an offset between two tracks, as a share of it
 _MAX_OFFSET_SHARE = 0.1  # largest offset that a bias explains, as a share of the distance from a sensor
+_MORE = 0.3  # by which the share of one sensor is larger for a track of it alone
+_MANY = 0.3  # share of the tracks of one sensor that have one of the other near them; a convoy has fewer
 _MIN_DETECTION = 0.3  # lowest probability of detection at which a scan should contain the target
 
 Label: TypeAlias = tuple[int, ...]
@@ -40,6 +42,11 @@ class _Track(NamedTuple):
     def is_measured_by(self, sensor: int) -> bool:
         detections = self.detections[sensor]
         return sum(detections) >= max(_MIN_SCANS, _MIN_SHARE * len(detections))
+
+    def share(self, sensor: int) -> float:
+        """Return the share of a sensor's scans in view of the track that have a measurement of it."""
+        detections = self.detections[sensor]
+        return sum(detections) / max(len(detections), 1)
 
 
 def disagreement_warnings(record: RunRecord, scenario: Scenario) -> tuple[str, ...]:
@@ -64,12 +71,12 @@ def disagreement_warnings(record: RunRecord, scenario: Scenario) -> tuple[str, .
             for detected in track.detections[other]
         ]
         share_a_track = any(track.is_measured_by(first) and track.is_measured_by(second) for track in tracks.values())
-        if share_a_track or len(detections) < _MIN_PAIRS or sum(detections) > _MAX_CHANCE_SHARE * len(detections):
-            continue
         names = model.sensor_names[first], model.sensor_names[second]
-        pairs = f"{sum(detections)} of {len(detections)} pairs of a track of one and a scan of the other"
-        checks = "check units, north (compass or east) and places"
-        warnings.append(f"{names[0]} and {names[1]} agree on no target ({pairs}): {checks}")
+        is_enough = len(detections) >= _MIN_PAIRS
+        if is_enough and not share_a_track and sum(detections) <= _MAX_CHANCE_SHARE * len(detections):
+            pairs = f"{sum(detections)} of {len(detections)} pairs of a track of one and a scan of the other"
+            checks = "check units, north (compass or east) and places"
+            warnings.append(f"{names[0]} and {names[1]} agree on no target ({pairs}): {checks}")
         warnings += _parallel_tracks(tracks, (first, second), names, record.poses[0, [first, second], :2])
     return tuple(warnings)
 
@@ -140,11 +147,11 @@ def _parallel_tracks(
     sensor_positions: (2, 2), m.
     """
     first, second = (
-        [track for track in tracks.values() if track.is_measured_by(one) and not track.is_measured_by(other)]
+        [each for each in tracks.values() if each.is_measured_by(one) and each.share(one) > each.share(other) + _MORE]
         for one, other in (pair, pair[::-1])
     )
     offsets = [offset for track in first if (offset := _nearest_offset(track, second, sensor_positions)) is not None]
-    if offsets:
+    if len(offsets) > _MANY * len(first):
         distance = f"{np.median(offsets):.0f} m from one of {names[1]}"
         finding = f"{len(offsets)} of {len(first)} tracks of {names[0]} keep {distance}, as two tracks of one target do"
         yield f"{finding}: `vedette calibrate` finds biases of range, bearing, clock and place"

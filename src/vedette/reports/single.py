@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+from vedette.evaluation.fit import Fit
 from vedette.evaluation.scans import measurement_code
 from vedette.reports.groups import group_of_run
 from vedette.reports.html import prepare_folder, render, section_of, write_page
@@ -50,6 +51,7 @@ def write_run_report(
         section=section_of(group, "g0"),
         untrusted=() if trust else measurement_code(scenario),
         described=scenario.model.description,
+        fit=None if manifest is None else Fit.from_dict(manifest.get("fit")),
         versions=None if manifest is None else _versions(manifest),
         citation="" if manifest is None else citation(manifest["versions"]["vedette"]),
     )

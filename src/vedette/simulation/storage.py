@@ -34,7 +34,12 @@ _PACKAGES = ("vedette", "numpy", "scipy", "numba")
 
 
 def save_run(
-    record: RunRecord, directory: Path | str, *, scenario_text: str | None = None, overwrite: bool = False
+    record: RunRecord,
+    directory: Path | str,
+    *,
+    scenario_text: str | None = None,
+    fit: Mapping[str, Any] | None = None,
+    overwrite: bool = False,
 ) -> Path:
     """Write a run as a new folder.
 
@@ -42,6 +47,7 @@ def save_run(
         record: the run.
         directory: the folder to make; missing parents are made too.
         scenario_text: text of the scenario, stored with the results.
+        fit: of the model to recorded scans (`vedette.evaluation.fit.Fit.to_dict`), kept in the manifest.
         overwrite: replace a folder that holds a run; a folder that holds anything else is never replaced.
 
     Returns the folder. Raises `InputError` if it exists already, cannot be written, or the record contradicts itself.
@@ -51,7 +57,7 @@ def save_run(
     files = {**encode_run(record), TIMINGS: encode_timings(record)}
     if scenario_text is not None:
         files[SCENARIO] = scenario_text.encode()
-    files[MANIFEST] = json.dumps(_manifest(record, files), indent=2, sort_keys=True).encode() + b"\n"
+    files[MANIFEST] = json.dumps(_manifest(record, files, fit), indent=2, sort_keys=True).encode() + b"\n"
     try:
         target.parent.mkdir(parents=True, exist_ok=True)
         with tempfile.TemporaryDirectory(dir=target.parent, prefix=f".{target.name}.") as scratch:
@@ -164,13 +170,14 @@ def holds_run(directory: Path | str) -> bool:
     return isinstance(manifest, dict) and manifest.get("format") == FORMAT
 
 
-def _manifest(record: RunRecord, files: Mapping[str, bytes]) -> dict[str, Any]:
+def _manifest(record: RunRecord, files: Mapping[str, bytes], fit: Mapping[str, Any] | None) -> dict[str, Any]:
     return {
         "format": FORMAT,
         "format_version": FORMAT_VERSION,
         "run": run_facts(record),
         "versions": versions(),
         "files": {name: hashlib.sha256(content).hexdigest() for name, content in files.items()},
+        **({} if fit is None else {"fit": fit}),
     }
 
 
