@@ -273,7 +273,7 @@ def test_memory_does_not_grow_with_the_number_of_scans(tmp_path: Path, num: int)
         (NO_REGION, "expected a region, or of sensor 1 `detection: {max_range: ...}`"),
         ("- 1\n", "expected a mapping with `sensors`"),
         ("recording: {bearings: up}\nregion: 1\n", "bearings: expected east or north; got up"),
-        ("recording: {units: {range: mile}}\nregion: 1\n", "units.range: expected one of m, km, nmi; got mile"),
+        ("recording: {units: {range: mile}}\nregion: 1\n", "units.range: expected one of m, km, nmi, nm, ft; got mile"),
     ],
 )
 def test_an_unsuitable_file_is_reported(tmp_path: Path, text: str, words: str) -> None:

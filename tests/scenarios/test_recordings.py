@@ -201,7 +201,9 @@ def test_dates_are_utc() -> None:
         (renamed({"time": "when"}), {}, "expected a column 'time'; got columns when, sensor, range, bearing_rad"),
         (ROWS, {"columns": {"range": "reach"}}, "expected a column 'reach'; got columns time, sensor"),
         (ROWS, {"columns": {"speed": "v"}}, "columns: expected quantities among time, sensor, bearing, range"),
-        (ROWS, {"units": {"range": "ft"}}, "units.range: expected one of m, km, nmi; got ft"),
+        (renamed({"range": "rho_yd"}), {"columns": {"range": "rho_yd"}}, "column 'rho_yd': expected one of m, km, nmi"),
+        (renamed({"range": "rho_deg"}), {"columns": {"range": "rho_deg"}}, "column 'rho_deg': expected one of m, km"),
+        (ROWS, {"units": {"range": "yd"}}, "units.range: expected one of m, km, nmi, nm, ft; got yd"),
         (ROWS, {"scan_window": -1.0}, "scan_window: expected seconds, at least 0; got -1.0"),
         (
             changed(0, own_lon=1.0, own_lat=2.0)[:1],
@@ -677,3 +679,21 @@ def test_invalid_recordings_are_reported(folder: Path, old: str, new: str, words
         scenario_from_recording(folder / "radars.yaml", folder / "scans.csv")
     with pytest.raises(InputError, match="units: expected a mapping of quantities"):
         Conventions({}, 3)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize(
+    ("column", "size"),
+    [
+        ("range_nm", 1852.0),
+        ("range_NM", 1852.0),
+        ("range_nmi", 1852.0),
+        ("range_ft", 0.3048),
+        ("rho_nm", 1852.0),
+        ("NM", 1852.0),
+    ],
+)
+def test_units_are_read_from_the_ends_of_columns_in_either_case(column: str, size: float) -> None:
+    columns = {} if column.startswith("range") else {"range": column}
+    first = parsed(renamed({"range": column}), columns=columns).scans[0][0]
+    assert first is not None
+    assert first[0, 1] == pytest.approx(1000.0 * size)

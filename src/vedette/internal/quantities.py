@@ -7,10 +7,10 @@ from collections.abc import Mapping
 from typing import NamedTuple
 
 # Units as they end the names of columns, and one of each in SI units; the first is the SI unit.
-LENGTHS = {"m": 1.0, "km": 1000.0, "nmi": 1852.0}
+LENGTHS = {"m": 1.0, "km": 1000.0, "nmi": 1852.0, "nm": 1852.0, "ft": 0.3048}
 ANGLES = {"rad": 1.0, "deg": math.pi / 180.0}
-HEIGHTS = LENGTHS | {"ft": 0.3048, "fl": 30.48}
-SPEEDS = {"mps": 1.0, "kmh": 1.0 / 3.6, "kn": 1852.0 / 3600.0}
+HEIGHTS = LENGTHS | {"fl": 30.48}
+SPEEDS = {"mps": 1.0, "kmh": 1.0 / 3.6, **dict.fromkeys(("kn", "kt", "kts"), 1852.0 / 3600.0)}
 
 
 class Quantity(NamedTuple):

@@ -13,7 +13,7 @@ from vedette.kernels.base.types import Floats
 from vedette.models.arguments import reject
 from vedette.models.pose_noise import pose_stds_of
 from vedette.platforms.compass import PlaneCompass
-from vedette.recorded.conventions import GAPS, OTHER_NAMES, OWN_SPEEDS, UNITS, Conventions
+from vedette.recorded.conventions import GAPS, OTHER_NAMES, OTHER_UNITS, OWN_SPEEDS, UNITS, Conventions
 from vedette.recorded.geography import Origin
 from vedette.recorded.scan_times import RecordedSensor
 from vedette.recorded.tables import Table, are_dates, column_names, is_empty
@@ -120,15 +120,26 @@ class ScanColumns:
             if quantity == "range" and all(site.kind in HEIGHT_DEPENDENT for site in self.sites)
             else ()
         )
+        by_lower = {name.casefold(): name for name in reversed([*self.table.columns])}
         for stem in (*slant, quantity, *OTHER_NAMES.get(quantity, ())):
-            for name in (stem, *(f"{stem}_{unit}" for unit in units)):
-                if name in self.table.columns:
+            if stem in self.table.columns:
+                return stem, self._unit(quantity, stem, units)
+            for unit in units:
+                name = by_lower.get(f"{stem}_{unit}".casefold(), "")
+                if name.startswith(f"{stem}_"):  # only the unit may be in capitals
                     return name, self._unit(quantity, name, units)
         return None
 
     def _unit(self, quantity: str, name: str, units: Mapping[str, float]) -> float:
         given = self.conventions.units.get(quantity)
-        ends = [unit for unit in units if name.endswith(f"_{unit}")]
+        ending = name.casefold().rpartition("_")[2]
+        ends = [unit for unit in units if ending == unit and unit]
+        if given is None and not ends and ending in OTHER_UNITS:
+            cure = f"units: {{{quantity}: {next(iter(units))}}} after conversion"
+            raise InputError(
+                f"{self.table.source}, column {shown(name)}: expected one of {', '.join(units)}, or {cure}; "
+                f"got {ending}"
+            )
         if given is None and not ends and units is ANGLES:
             if self._told_by_compass(quantity):
                 return ANGLES["deg"]

@@ -37,6 +37,9 @@ UNITS: dict[str, Mapping[str, float]] = {
     "class": {"": 1.0},
     "size": LENGTHS,
 }
+# Endings of columns that are units, but none of the quantity: taken for SI units they would be wrong without a word.
+_UNREAD = ("mi", "mile", "miles", "yd", "cm", "mm", "feet", "knots", "mph", "kph", "fps", "mil", "gon")
+OTHER_UNITS = frozenset((*HEIGHTS, *SPEEDS, *ANGLES, *_UNREAD))
 OWN_SPEEDS = ("own_vx", "own_vy")  # velocity of a sensor, east and north, read if it measures range rates
 # Third components of measurements, which single rows need not have, and what stands in for them until births.
 GAPS = {"altitude": ASSUMED_HEIGHT, "elevation": 0.0, "range_rate": 0.0}

@@ -45,7 +45,8 @@ class RecordingSection(Section):
     )
     units: dict[str, str] = Field(
         default={},
-        description="Units of quantities whose columns do not name them: m, km, nmi; deg, rad; mps, kmh, kn [-].",
+        description="Units of quantities whose columns do not name them: m, km, nmi, ft; deg, rad; mps, kmh, kn; of "
+        "heights also fl [-].",
     )
     bearings: Literal["east", "north"] | None = Field(
         default=None,
