@@ -67,12 +67,29 @@ def test_a_search_that_did_not_converge_has_no_intervals(place: Path, monkeypatc
     assert "Warning: the optimiser stopped before it converged." in result.stderr
     assert " to " not in result.stdout.split("Clock offsets")[0]
     assert (place / "found.yaml").read_text("utf-8").startswith("# The optimiser stopped before it converged")
-    assert set(read_yaml((place / "found.yaml").read_text("utf-8"), "found.yaml").data) >= {"sensors"}
+    written = read_yaml((place / "found.yaml").read_text("utf-8"), "found.yaml").data["sensors"]
+    assert [each["bias"] for each in written] == [{}, {}]
+    assert "biases are as before" in result.stdout
     result = call(*words, "--json")
     assert result.exit_code == 3, result.output
     told = json.loads(result.stdout)
     assert told["converged"] is False
     assert {row["ci_low"] for row in told["parameters"]} == {row["ci_high"] for row in told["parameters"]} == {None}
+
+
+def test_biases_of_a_single_sensor_are_estimated_only_if_asked(place: Path) -> None:
+    rows = (place / "scans.csv").read_text("utf-8").splitlines(keepends=True)
+    (place / "one.csv").write_text("".join([rows[0], *(row for row in rows[1:] if "Calshot" in row)]), "utf-8")
+    text = (place / "radars.yaml").read_text("utf-8").splitlines(keepends=True)
+    (place / "one.yaml").write_text("".join(line for line in text if "name: boat" not in line), "utf-8")
+    words = ("calibrate", "one.csv", "--sensors", "one.yaml", "--json")
+    for option, told in ((), False), (("--biases",), True), (("--no-biases",), False):
+        result = call(*words, *option)
+        assert result.exit_code == 0, result.output
+        names = {row["parameter"] for row in json.loads(result.stdout)["parameters"]}
+        assert ("bearing_deg" in names) is told
+        assert "detection.probability" in names
+        assert ("Biases of a single sensor are not estimated" in result.stderr) is (option == ())
 
 
 def test_existing_files_are_not_overwritten_without_the_option(place: Path) -> None:

@@ -14,7 +14,7 @@ from vedette.cli.calibration_table import calibration_document, print_windows, w
 from vedette.cli.compiling import compiling
 from vedette.cli.errors import check_ending
 from vedette.cli.options import BadRows, Overwrite, ScansFile, SensorsFile, Speed, Trust
-from vedette.cli.output import console, echo, emit_json
+from vedette.cli.output import console, echo, emit_json, note
 from vedette.cli.running import interruptible
 from vedette.cli.scenario_files import write_text
 from vedette.cli.tracking import read_recording
@@ -33,6 +33,10 @@ Out = Annotated[
 SensorPositions = Annotated[
     bool, typer.Option("--sensor-positions", help="Also estimate errors of the sensor positions (x, y).")
 ]
+Biases = Annotated[
+    bool | None,
+    typer.Option("--biases/--no-biases", help="Estimate biases; default: if there are several sensors."),
+]
 Window = Annotated[
     float | None,
     typer.Option(
@@ -47,6 +51,7 @@ def calibrate(
     out: Out = None,
     overwrite: Overwrite = False,
     position: SensorPositions = False,
+    biases: Biases = None,
     window: Window = None,
     speed: Speed = 10.0,
     bad_rows: BadRows = "refuse",
@@ -61,7 +66,10 @@ def calibrate(
     _check_output(out, overwrite)
     recorded, warnings = read_recording(sensors, scans, None, speed=speed, bad_rows=bad_rows, trust=trust)
     with interruptible("nothing was written"):
-        windows = _calibrate(recorded.scenario, window or math.inf, position)
+        several = len(recorded.scenario.model.sensors) > 1
+        if biases is None and not several:
+            note("Biases of a single sensor are not estimated, as manoeuvres look like them: --biases estimates them.")
+        windows = _calibrate(recorded.scenario, window or math.inf, position, several if biases is None else biases)
         if out is not None:
             write_text(out, calibrated_text(recorded.scenario, sensors, windows[-1].calibration, out.parent))
     names = recorded.scenario.model.sensor_names
@@ -69,7 +77,9 @@ def calibrate(
     if out is None:
         echo("Nothing was written. Add --out calibrated.yaml to save the estimates for `vedette track`.")
     else:
-        echo(f"Wrote {out}. Use it with: vedette track {scans} --sensors {out}")
+        whole = windows[-1].calibration.converged
+        kept = "" if whole else " The search did not converge: biases are as before."
+        echo(f"Wrote {out}.{kept} Use it with: vedette track {scans} --sensors {out}")
     document = (
         calibration_document(windows[0].calibration, names) if window is None else windows_document(windows, names)
     )
@@ -89,11 +99,11 @@ def _check_output(out: Path | None, overwrite: bool) -> None:
         raise InputError(f"{out}: expected a file that can be written; {reason}")
 
 
-def _calibrate(scenario: Scenario, window: float, position: bool) -> list[CalibrationWindow]:
+def _calibrate(scenario: Scenario, window: float, position: bool, biases: bool) -> list[CalibrationWindow]:
     from vedette.calibration.bias_drift import calibrate_windows
     from vedette.scenarios.calibration import build_problem
 
-    problem = build_problem(scenario, position=position)
+    problem = build_problem(scenario, position=position, biases=biases)
     with compiling(), _pass_counter() as progress:
         return list(calibrate_windows(problem, window, progress))
 

@@ -39,11 +39,15 @@ _SUPPORTED_CLUTTER = (
     "around_sensor",
     "measurement_space",
 )  # clutter that can be evaluated at the raw measurement
-_NOT_CONVERGED = "# The optimiser stopped before it converged: these values may be inaccurate."
+_NOT_CONVERGED = (
+    "# The optimiser stopped before it converged: these values may be inaccurate, and biases are as before."
+)
 _MIN_RATE, _MAX_PROBABILITY = 0.01, 0.98  # to start from
 
 
-def build_problem(scenario: Scenario, *, position: bool = False, bearings: Bearings | None = None) -> Problem:
+def build_problem(
+    scenario: Scenario, *, position: bool = False, biases: bool = True, bearings: Bearings | None = None
+) -> Problem:
     """Return the calibration problem of a recording: its sensors' parameters, to be estimated.
 
     The parameters are biases of the measured quantities and of the clock, noise, probability of detection and clutter
@@ -54,6 +58,7 @@ def build_problem(scenario: Scenario, *, position: bool = False, bearings: Beari
     Args:
         scenario: from `vedette.scenarios.from_recording`; one of sensors alone, for future scans, has no recording.
         position: True to estimate biases of the other sensors' own places, too.
+        biases: False to leave out all biases.
         bearings: in which direction the biases of bearings count if there is no recording.
     """
     model, folder = scenario.model, scenario.folder
@@ -65,7 +70,8 @@ def build_problem(scenario: Scenario, *, position: bool = False, bearings: Beari
     for s, sensor in enumerate(model.sensors):
         if not recording.scans or any(scans[s] is not None for scans in recording.scans):
             clockwise = recording.bearings[s] == "north"
-            parameters += _bias_parameters(s, sensor, sites[s].bias, clockwise, position, only_positions)
+            if biases:
+                parameters += _bias_parameters(s, sensor, sites[s].bias, clockwise, position, only_positions)
             parameters += _model_parameters(s, sensor)
     filters = [sensor.filter for sensor in build_sensors(scenario)]
     targets = _births_per_scan(common_target_model(filters), recording.times)
@@ -215,8 +221,8 @@ def _with_values(
 def calibrated_text(scenario: Scenario, sensors: FilePath, calibration: Calibration, folder: FilePath) -> str:
     """Return the sensors file with the estimates.
 
-    Parameters that are not identifiable keep their values; comments are lost. The first line is a comment if the
-    optimiser did not converge.
+    Parameters that are not identifiable keep their values; comments are lost. If the optimiser did not converge, so do
+    all biases, and the first line is a comment.
 
     Args:
         scenario: of the recording.
@@ -229,7 +235,7 @@ def calibrated_text(scenario: Scenario, sensors: FilePath, calibration: Calibrat
     parameters = [each.parameter for each in calibration.estimates]
     values = [float(f"{each.value:.7g}") for each in calibration.estimates]  # far more digits than are accurate
     for each, value in zip(calibration.estimates, values, strict=True):
-        if each.parameter.kind == "bias" and not each.reason:
+        if each.parameter.kind == "bias" and not each.reason and calibration.converged:
             biases[each.parameter.sensor][each.parameter.name] = value
     sections = _with_values(scenario.model.sensors, parameters, values)
     data["sensors"] = [
