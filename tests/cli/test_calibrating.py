@@ -69,7 +69,8 @@ def test_a_search_that_did_not_converge_has_no_intervals(place: Path, monkeypatc
     assert (place / "found.yaml").read_text("utf-8").startswith("# The optimiser stopped before it converged")
     written = read_yaml((place / "found.yaml").read_text("utf-8"), "found.yaml").data["sensors"]
     assert [each["bias"] for each in written] == [{}, {}]
-    assert "biases are as before" in result.stdout
+    assert [each["detection"]["probability"] for each in written] == [0.95, 0.95]
+    assert "its values are those of the old file" in result.stdout
     result = call(*words, "--json")
     assert result.exit_code == 3, result.output
     told = json.loads(result.stdout)

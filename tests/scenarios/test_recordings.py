@@ -697,3 +697,26 @@ def test_units_are_read_from_the_ends_of_columns_in_either_case(column: str, siz
     first = parsed(renamed({"range": column}), columns=columns).scans[0][0]
     assert first is not None
     assert first[0, 1] == pytest.approx(1000.0 * size)
+
+
+def test_a_sensor_of_positions_needs_no_place_of_its_own_in_the_rows() -> None:
+    rows = [
+        {
+            "time": "0",
+            "sensor": "radar",
+            "range": "1000",
+            "bearing_rad": "0",
+            "x": "",
+            "y": "",
+            "own_x": "5",
+            "own_y": "6",
+        },
+        {"time": "1", "sensor": "ais", "range": "", "bearing_rad": "", "x": "3", "y": "4", "own_x": "", "own_y": ""},
+    ]
+    sites = (replace(SITES[0], name="radar"), replace(SITES[0], name="ais", kind="position", pose=(1.0, 2.0, 0.0)))
+    found = parsed(rows, sites)
+    np.testing.assert_array_equal(np.asarray(found.scans[1][1]), [[3.0, 4.0]])
+    assert found.poses[1, 1].tolist() == [1.0, 2.0, 0.0]
+    assert found.poses[0, 0, :2].tolist() == [5.0, 6.0]
+    with pytest.raises(InputError, match="row 2, column 'own_x': expected a finite number"):
+        parsed([{**rows[0], "own_x": ""}], sites)

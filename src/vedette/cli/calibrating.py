@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -25,6 +26,7 @@ if TYPE_CHECKING:
     from vedette.scenarios import Scenario
 
 NOT_CONVERGED = 3  # exit status
+_SECONDS_A_LINE = 10.0  # between lines of progress in pipes
 
 Out = Annotated[
     Path | None,
@@ -66,19 +68,20 @@ def calibrate(
     _check_output(out, overwrite)
     recorded, warnings = read_recording(sensors, scans, None, speed=speed, bad_rows=bad_rows, trust=trust)
     with interruptible("nothing was written"):
-        several = len(recorded.scenario.model.sensors) > 1
+        scanning = {s for scans in recorded.recording.scans for s, scan in enumerate(scans) if scan is not None}
+        several = len(scanning) > 1
         if biases is None and not several:
             note("Biases of a single sensor are not estimated, as manoeuvres look like them: --biases estimates them.")
         windows = _calibrate(recorded.scenario, window or math.inf, position, several if biases is None else biases)
         if out is not None:
-            write_text(out, calibrated_text(recorded.scenario, sensors, windows[-1].calibration, out.parent))
+            last = windows[-1].calibration._replace(converged=all(part.calibration.converged for part in windows))
+            write_text(out, calibrated_text(recorded.scenario, sensors, last, out.parent))
     names = recorded.scenario.model.sensor_names
     print_windows(windows, names, position=position)
     if out is None:
         echo("Nothing was written. Add --out calibrated.yaml to save the estimates for `vedette track`.")
     else:
-        whole = windows[-1].calibration.converged
-        kept = "" if whole else " The search did not converge: biases are as before."
+        kept = "" if last.converged else " The search did not converge: its values are those of the old file."
         echo(f"Wrote {out}.{kept} Use it with: vedette track {scans} --sensors {out}")
     document = (
         calibration_document(windows[0].calibration, names) if window is None else windows_document(windows, names)
@@ -110,11 +113,28 @@ def _calibrate(scenario: Scenario, window: float, position: bool, biases: bool) 
 
 @contextmanager
 def _pass_counter() -> Iterator[Callable[[], None]]:
-    """Show on a terminal how many times the filter has processed the recording."""
+    """Show how many times the filter has processed the recording: on a terminal always, in pipes as a line a while."""
     from rich.progress import Progress, TextColumn, TimeElapsedColumn
 
     screen = console(stderr=True)
+    if not screen.is_terminal:
+        yield _line_printer()
+        return
     columns = (TimeElapsedColumn(), TextColumn("{task.description} {task.completed:.0f}"))
-    with Progress(*columns, console=screen, disable=not screen.is_terminal, transient=True) as bar:
+    with Progress(*columns, console=screen, transient=True) as bar:
         task = bar.add_task("passes of the filter:", total=None)
         yield lambda: bar.advance(task)
+
+
+def _line_printer() -> Callable[[], None]:
+    """Return a counter of passes that prints a line after each `_SECONDS_A_LINE`."""
+    passes, due = 0, time.monotonic() + _SECONDS_A_LINE
+
+    def count() -> None:
+        nonlocal passes, due
+        passes += 1
+        if time.monotonic() >= due:
+            note(f"calibrate: {passes} passes of the filter over the recording so far")
+            due = time.monotonic() + _SECONDS_A_LINE
+
+    return count

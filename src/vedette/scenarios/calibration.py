@@ -39,9 +39,7 @@ _SUPPORTED_CLUTTER = (
     "around_sensor",
     "measurement_space",
 )  # clutter that can be evaluated at the raw measurement
-_NOT_CONVERGED = (
-    "# The optimiser stopped before it converged: these values may be inaccurate, and biases are as before."
-)
+_NOT_CONVERGED = "# The optimiser stopped before it converged: all values are as before."
 _MIN_RATE, _MAX_PROBABILITY = 0.01, 0.98  # to start from
 
 
@@ -212,7 +210,7 @@ def _with_values(
             section = getattr(updated[parameter.sensor], parameter.kind)
             _, name, *indices = parameter.name.split(".")
             current = getattr(section, name)
-            items = [value if str(i) in indices else item for i, item in enumerate(current)] if indices else value
+            items = tuple(value if str(i) in indices else item for i, item in enumerate(current)) if indices else value
             section = section.model_copy(update={name: items})
             updated[parameter.sensor] = updated[parameter.sensor].model_copy(update={parameter.kind: section})
     return tuple(updated)
@@ -222,7 +220,7 @@ def calibrated_text(scenario: Scenario, sensors: FilePath, calibration: Calibrat
     """Return the sensors file with the estimates.
 
     Parameters that are not identifiable keep their values; comments are lost. If the optimiser did not converge, so do
-    all biases, and the first line is a comment.
+    all parameters, and the first line is a comment.
 
     Args:
         scenario: of the recording.
@@ -232,11 +230,12 @@ def calibrated_text(scenario: Scenario, sensors: FilePath, calibration: Calibrat
     """
     data = dict(read_yaml(read_text(sensors, "sensors file", MAX_BYTES), str(sensors)).data)
     biases = [sensor.bias.model_dump(exclude_defaults=True) for sensor in scenario.model.sensors]
-    parameters = [each.parameter for each in calibration.estimates]
-    values = [float(f"{each.value:.7g}") for each in calibration.estimates]  # far more digits than are accurate
-    for each, value in zip(calibration.estimates, values, strict=True):
-        if each.parameter.kind == "bias" and not each.reason and calibration.converged:
-            biases[each.parameter.sensor][each.parameter.name] = value
+    found = [each for each in calibration.estimates if calibration.converged and not each.reason]
+    parameters = [each.parameter for each in found]
+    values = [float(f"{each.value:.7g}") for each in found]  # far more digits than are accurate
+    for each, value in zip(parameters, values, strict=True):
+        if each.kind == "bias":
+            biases[each.sensor][each.name] = value
     sections = _with_values(scenario.model.sensors, parameters, values)
     data["sensors"] = [
         {
