@@ -27,7 +27,7 @@ from typing import Any
 
 import numpy as np
 from compared import Timed
-from scenes import own, site, track
+from scenes import decades, own, site, track
 
 from vedette.densities import cardinality_distribution
 from vedette.errors import VedetteError
@@ -44,11 +44,6 @@ FILTERS: dict[str, dict[str, Any]] = {
     "delta-GLMB 1,000": {"filter.kind": "delta_glmb", "filter.limits.max_hypotheses": 1000},
 }
 MEASURES = ("scans until tracked", "OSPA, % of cutoff", "log score", "ms")
-
-
-def decades(rng: np.random.Generator, low: float, high: float) -> float:
-    """Draw a number that is uniform in its logarithm."""
-    return float(np.exp(rng.uniform(math.log(low), math.log(high))))
 
 
 def drawn_fields(number: int, run: int) -> tuple[str, dict[str, Any]]:

@@ -6,6 +6,7 @@ see all of a square of a kilometre, one scan a second.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cache
@@ -62,6 +63,11 @@ class Scene:
     scenario: Callable[[int], Scenario]
     planner: str = "stationary"
     share: float = 1.0
+
+
+def decades(rng: np.random.Generator, low: float, high: float) -> float:
+    """Draw a number that is uniform in its logarithm."""
+    return float(np.exp(rng.uniform(math.log(low), math.log(high))))
 
 
 def own(name: str, fields: dict[str, Any], num_sensors: int = 1, fusion: dict[str, Any] | None = None) -> Scene:

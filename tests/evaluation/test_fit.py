@@ -15,7 +15,7 @@ from recordings import write_recording
 from vedette.evaluation.fit import Finding, Fit, fit_of_run
 from vedette.evaluation.innovations import SensorFit, sensor_fits
 from vedette.evaluation.runs import run_scenario, track_recording
-from vedette.evaluation.scans import scans_of_record
+from vedette.evaluation.scans import rows_of_record
 from vedette.scenarios import Scenario, parse_scenario, replace_fields
 from vedette.scenarios.build import build_sensors
 from vedette.scenarios.from_recording import scenario_from_recording
@@ -81,7 +81,7 @@ def test_innovations_are_those_of_a_kalman_filter() -> None:
     )
     record = run_scenario(scenario, "stationary", seed=0)
     [sensor] = build_sensors(scenario)
-    scans = scans_of_record(record, scenario)
+    scans = rows_of_record(record, scenario)
     [fit] = sensor_fits(record, scans, (sensor.filter.sensor,), sensor.filter.targets.motion)
     transition = np.eye(4) + np.diag([1.0, 1.0], 2)
     start = next(k for k, each in enumerate(record.estimates) if len(each.means))
@@ -94,7 +94,7 @@ def test_innovations_are_those_of_a_kalman_filter() -> None:
         assert scan is not None
         assert match.innovation is not None
         spread = cov[:2, :2] + 400.0 * np.eye(2)
-        np.testing.assert_allclose(match.innovation, scan.measurements[0] - mean[:2], atol=1e-4)
+        np.testing.assert_allclose(match.innovation, scan[0] - mean[:2], atol=1e-4)
         np.testing.assert_allclose(match.cov, spread, rtol=1e-5)
         gain = cov[:, :2] @ np.linalg.inv(spread)
         mean, cov = mean + gain @ match.innovation, cov - gain @ spread @ gain.T

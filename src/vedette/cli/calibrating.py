@@ -23,7 +23,7 @@ from vedette.errors import InputError
 
 if TYPE_CHECKING:
     from vedette.calibration import CalibrationWindow
-    from vedette.scenarios import Scenario
+    from vedette.scenarios.from_recording import RecordingScenario
 
 NOT_CONVERGED = 3  # exit status
 _SECONDS_A_LINE = 10.0  # between lines of progress in pipes
@@ -68,11 +68,7 @@ def calibrate(
     _check_output(out, overwrite)
     recorded, warnings = read_recording(sensors, scans, None, speed=speed, bad_rows=bad_rows, trust=trust)
     with interruptible("nothing was written"):
-        scanning = {s for scans in recorded.recording.scans for s, scan in enumerate(scans) if scan is not None}
-        several = len(scanning) > 1
-        if biases is None and not several:
-            note("Biases of a single sensor are not estimated, as manoeuvres look like them: --biases estimates them.")
-        windows = _calibrate(recorded.scenario, window or math.inf, position, several if biases is None else biases)
+        windows = _calibrate(recorded, window or math.inf, position, biases)
         if out is not None:
             last = windows[-1].calibration._replace(converged=all(part.calibration.converged for part in windows))
             write_text(out, calibrated_text(recorded.scenario, sensors, last, out.parent))
@@ -102,11 +98,20 @@ def _check_output(out: Path | None, overwrite: bool) -> None:
         raise InputError(f"{out}: expected a file that can be written; {reason}")
 
 
-def _calibrate(scenario: Scenario, window: float, position: bool, biases: bool) -> list[CalibrationWindow]:
+def _calibrate(
+    recorded: RecordingScenario, window: float, position: bool, biases: bool | None
+) -> list[CalibrationWindow]:
+    """Return the calibrations of the parts of a recording; biases: None for those of two sensors or more that scan."""
     from vedette.calibration.bias_drift import calibrate_windows
     from vedette.scenarios.calibration import build_problem
 
-    problem = build_problem(scenario, position=position, biases=biases)
+    if biases is None:
+        instants = recorded.recording.scans
+        biases = len({s for instant in instants for s, scan in enumerate(instant) if scan is not None}) > 1
+        if not biases:
+            why = "as manoeuvres look like them"
+            note(f"Biases of a single sensor are not estimated, {why}: --biases estimates them.")
+    problem = build_problem(recorded.scenario, position=position, biases=biases)
     with compiling(), _pass_counter() as progress:
         return list(calibrate_windows(problem, window, progress))
 

@@ -5,17 +5,15 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
-import numpy as np
-
 from vedette.cli.output import console as new_console
 from vedette.cli.output import is_verbose
 from vedette.internal.text import pluralise, with_unit
-from vedette.kernels.base.types import Bools
 
 if TYPE_CHECKING:
     from rich.console import Console
 
     from vedette.evaluation.fit import Fit
+    from vedette.kernels.base.types import Bools
     from vedette.scenarios import Scenario
     from vedette.simulation.records import RunRecord
 
@@ -111,12 +109,15 @@ def _far_words(record: RunRecord, scenario: Scenario, counts: Bools, total: floa
     cutoff = scenario.model.ospa.cutoff
     if total < _NEAR_CUTOFF * cutoff:
         return ""
-    near = list[bool]()
-    for k in np.flatnonzero(counts).tolist():
-        means = record.estimates[k].means[:, :2]
-        near += [bool((np.hypot(*(means - state[:2]).T) < cutoff).any()) for state in record.truth.at(k)[1]]
-    far = f"{1.0 - np.mean(near):.0%}".replace("%", " %") if near else "none"
-    return f"cutoff {with_unit(f'{cutoff:g}', scenario.model.ospa.unit)}: {far} of targets have no estimate within it; "
+    from vedette.evaluation.health import percent
+    from vedette.evaluation.runs import measure_run
+
+    words = f"cutoff {with_unit(f'{cutoff:g}', scenario.model.ospa.unit)}"
+    alive = int((record.truth.offsets[1:] - record.truth.offsets[:-1])[counts].sum())
+    if not alive:
+        return f"{words}; "
+    missed = int(measure_run(record, scenario).num_missed[counts].sum())
+    return f"{words}: {percent(missed / alive)} of targets have no estimate within it; "
 
 
 def _print_diagnostics(console: Console, record: RunRecord, scenario: Scenario | None) -> None:

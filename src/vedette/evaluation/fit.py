@@ -8,8 +8,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from vedette.evaluation.innovations import Match, RawScan, SensorFit, by_label, sensor_fits
-from vedette.evaluation.scans import scans_of_record
+from vedette.evaluation.innovations import Match, SensorFit, by_label, sensor_fits
+from vedette.evaluation.scans import rows_of_record
 from vedette.evaluation.sensor_agreement import disagreement_warnings
 from vedette.evaluation.unexplained_courses import unexplained_course_warnings
 from vedette.internal.quantities import QUANTITIES
@@ -60,7 +60,7 @@ class Fit(NamedTuple):
         return cls(tuple(Finding(**each) for each in data["findings"]), data["searched"])
 
     def lines(self, num_warnings: int = 0) -> list[str]:
-        """Return the findings in words, or what was searched if there are none.
+        """Return the texts of the findings; without any, one line that names the tests.
 
         num_warnings: warnings of the scenario that were shown; then nothing is called faultless.
         """
@@ -93,12 +93,10 @@ def fit_of_run(record: RunRecord, scenario: Scenario) -> Fit:
     filters = [each.filter for each in build_sensors(scenario)]
     names = scenario.model.sensor_names
     models = tuple(each.sensor for each in filters)
-    scans, motion = scans_of_record(record, scenario), filters[0].targets.motion
-    fits = sensor_fits(record, scans, models, motion, _raw_scans(scenario))
+    fits = sensor_fits(record, rows_of_record(record, scenario), models, filters[0].targets.motion)
     findings = [Finding("agreement", "", text) for text in disagreement_warnings(record, scenario)]
     for name, fit, model in zip(names, fits, models, strict=True):
-        rate = model.clutter.rate
-        findings += (Finding(test, name, f"{name}: {text}") for test, text in _of_sensor(fit, model, rate, len(names)))
+        findings += (Finding(test, name, f"{name}: {text}") for test, text in _of_sensor(fit, model, len(names)))
     findings += (Finding("fast targets", "", text) for text in unexplained_course_warnings(record, scenario))
     num = sum(len(fit.matches) for fit in fits)
     tests = "bias, noise, motion, detection, several returns, clutter"
@@ -106,27 +104,12 @@ def fit_of_run(record: RunRecord, scenario: Scenario) -> Fit:
     return Fit(tuple(findings), f"{tests}{agreement} ({num} pairs of a track and a scan)")
 
 
-def _raw_scans(scenario: Scenario) -> RawScan | None:
-    """Return the scans of a recording with the noise of their rows; None for simulated scans."""
-    if (section := scenario.model.recording) is None:
-        return None
-    scans = section.build(scenario.model, scenario.folder).scans
-
-    def of_scan(k: int, s: int) -> Floats:
-        scan = scans[k][s]
-        assert scan is not None  # asked for only where there is one
-        return scan
-
-    return of_scan
-
-
-def _of_sensor(fit: SensorFit, model: SensorModel, rate: float, num_sensors: int) -> Iterator[tuple[str, str]]:
+def _of_sensor(fit: SensorFit, model: SensorModel, num_sensors: int) -> Iterator[tuple[str, str]]:
     """Yield the findings of a sensor as test and text."""
-    components = model.measurement.components
-    if components:
+    if components := model.measurement.components:
         yield from _innovation_findings(fit, components, num_sensors)
     yield from _detection_findings(fit)
-    yield from _clutter_findings(fit, rate)
+    yield from _clutter_findings(fit, model.clutter.rate)
 
 
 def _innovation_findings(fit: SensorFit, components: Sequence[str], num_sensors: int) -> Iterator[tuple[str, str]]:
@@ -136,7 +119,7 @@ def _innovation_findings(fit: SensorFit, components: Sequence[str], num_sensors:
         quantity = QUANTITIES[name]
         own = [np.array([_component(each, i) for each in track]).reshape(-1, 2) for track in tracks]
         mean, squares = _mean([each[:, 0] for each in own]), _mean([each[:, 0] ** 2 / each[:, 1] for each in own])
-        spread = math.sqrt(squares.value) if squares.value > 0.0 else math.nan
+        spread = math.sqrt(squares.value)
         lag = _mean([each[1:, 0] * each[:-1, 0] / each[1:, 1] for each in own])
         if num_sensors > 1 and mean.away_from(0.0) > _SURE and abs(mean.value) > _LEAST_BIAS * noise:
             yield (
@@ -153,11 +136,10 @@ def _innovation_findings(fit: SensorFit, components: Sequence[str], num_sensors:
                 "targets turn or accelerate more than `motion` assumes: raise its noise, or `--max-target-speed`",
             )
         else:
-            size = math.sqrt(max(squares.value, 0.0))
             yield (
                 "noise",
-                f"{_plural(name)} spread {with_two_digits(size)} times as much about its tracks as noise and motion "
-                f"explain (noise {with_two_digits(noise * quantity.per_si)} {quantity.unit}): `vedette calibrate` "
+                f"{_plural(name)} spread {_with_two_digits(spread)} times as much about its tracks as noise and motion "
+                f"explain (noise {_with_two_digits(noise * quantity.per_si)} {quantity.unit}): `vedette calibrate` "
                 "estimates it",
             )
 
@@ -226,7 +208,7 @@ def _plural(name: str) -> str:
     return f"positions {name}" if name in ("x", "y") else f"{name.replace('_', ' ')}s"
 
 
-def with_two_digits(value: float) -> str:
+def _with_two_digits(value: float) -> str:
     """Return a positive number with two significant digits or more, and without an exponent: `1.0`, `0.021`, `120`."""
     return f"{value:.{max(0, 1 - math.floor(math.log10(max(value, 1e-9))))}f}"
 
@@ -234,7 +216,7 @@ def with_two_digits(value: float) -> str:
 def _signed(name: str, value: float) -> str:
     """Return a difference in the unit of files with its direction: `1.0 deg clockwise`."""
     quantity = QUANTITIES[name]
-    size = f"{with_two_digits(abs(value) * quantity.per_si)} {quantity.unit}"
+    size = f"{_with_two_digits(abs(value) * quantity.per_si)} {quantity.unit}"
     if name == "bearing":
         return f"{size} {'anticlockwise' if value > 0.0 else 'clockwise'}"
     return f"{size} {'more' if value > 0.0 else 'less'}"

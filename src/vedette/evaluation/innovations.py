@@ -10,7 +10,7 @@ from typing import NamedTuple, TypeAlias
 import numpy as np
 
 from vedette.densities import Estimate
-from vedette.evaluation.scans import Scans
+from vedette.evaluation.scans import Rows
 from vedette.kernels.base.types import Bools, Floats
 from vedette.models.measurement import wrap_periodic
 from vedette.models.motion import MotionModel
@@ -24,7 +24,6 @@ _STEP = 1e-4  # of central differences, as a share of the standard deviation of 
 _SINGLE = 1.5  # gates between two tracks that are not confused
 
 Label: TypeAlias = tuple[int, ...]
-RawScan: TypeAlias = Callable[[int, int], Floats]
 
 
 class Match(NamedTuple):
@@ -49,20 +48,20 @@ class SensorFit:
 
     Attributes:
         matches: tracks at the sensor's scans, in order of time.
-        noise: sums of the noise covariances of the matches, (meas_dim, meas_dim).
+        variances: sums of the variances of the noise over the matches, (meas_dim,).
         num_scans: scans that were looked at.
         unexplained: measurements in the gate of no track, over these scans.
     """
 
     matches: list[Match] = field(default_factory=list)
-    noise: Floats = field(default_factory=lambda: np.zeros((0, 0)))
+    variances: Floats = field(default_factory=lambda: np.zeros(0))
     num_scans: int = 0
     unexplained: int = 0
 
     @property
     def noise_stds(self) -> Floats:
         """Root mean square noise of each component over the matches, (meas_dim,)."""
-        return np.asarray(np.sqrt(np.diagonal(self.noise) / max(len(self.matches), 1)))
+        return np.asarray(np.sqrt(self.variances / max(len(self.matches), 1)))
 
 
 class _Predicted(NamedTuple):
@@ -73,10 +72,9 @@ class _Predicted(NamedTuple):
 
 def sensor_fits(
     record: RunRecord,
-    scans: Scans,
+    scans: Rows,
     sensors: tuple[SensorModel, ...],
     motion: MotionModel,
-    raw_scan: RawScan | None = None,
 ) -> tuple[SensorFit, ...]:
     """Return for each sensor its measurements against the tracks of a run.
 
@@ -85,19 +83,17 @@ def sensor_fits(
 
     Args:
         record: the run.
-        scans: its scans, as `vedette.evaluation.scans.scans_of_record` returns them.
+        scans: its scans, as `vedette.evaluation.scans.rows_of_record` returns them.
         sensors: the models of the sensors that the filters assume.
         motion: of the targets.
-        raw_scan: returns the scan of instant k and sensor s with the noise of its rows; None: rows bring none.
     """
-    fits = tuple(SensorFit(noise=np.zeros((each.meas_dim, each.meas_dim))) for each in sensors)
+    fits = tuple(SensorFit(variances=np.zeros(each.meas_dim)) for each in sensors)
     for k in np.unique(np.linspace(1, record.num_scans - 1, min(_MOST_SCANS, record.num_scans - 1)).astype(int)):
         before, dt = record.estimates[k - 1], float(record.times[k] - record.times[k - 1])
         predicted = _predicted(before, record.estimates[k], motion, dt)
         for s, (fit, sensor, scan) in enumerate(zip(fits, sensors, scans[k], strict=True)):
             if scan is not None:
-                raw = scan.measurements if raw_scan is None else raw_scan(int(k), s)
-                _add_scan(fit, sensor, raw, record.poses[k, s], predicted)
+                _add_scan(fit, sensor, scan, record.poses[k, s], predicted)
     return fits
 
 
@@ -106,12 +102,12 @@ def _predicted(before: Estimate, after: Estimate, motion: MotionModel, dt: float
     present = set(map(tuple, after.labels.tolist()))
     labels = list(map(tuple, before.labels.tolist()))
     kept = [i for i, label in enumerate(labels) if label in present]
-    means, covs = before.means[kept], before.covs[kept]
+    means, covs, labels = before.means[kept], before.covs[kept], [labels[i] for i in kept]
     if not kept or dt <= 0.0:
-        return _Predicted([labels[i] for i in kept], means, covs)
+        return _Predicted(labels, means, covs)
     jacobians = _jacobians(lambda states: motion.propagate(states, dt), means, covs, None)
     moved = jacobians @ covs @ jacobians.transpose(0, 2, 1) + motion.noise_covs(means, dt)
-    return _Predicted([labels[i] for i in kept], motion.propagate(means, dt), moved)
+    return _Predicted(labels, motion.propagate(means, dt), moved)
 
 
 def _jacobians(function: Callable[[Floats], Floats], means: Floats, covs: Floats, periods: Floats | None) -> Floats:
@@ -141,7 +137,7 @@ def _add_scan(fit: SensorFit, sensor: SensorModel, raw: Floats, pose: Floats, pr
     moved = jacobians @ covs @ jacobians.transpose(0, 2, 1)
     spread = moved + noise
     of_rows = np.array([noise_of_rows(raw, np.repeat(each[None], len(raw), axis=0)) for each in noise])
-    spreads = moved[:, None] + of_rows.reshape(len(noise), len(raw), *fit.noise.shape)
+    spreads = moved[:, None] + of_rows.reshape(len(noise), len(raw), *noise.shape[1:])
     inside = _inside(measured, expected, spreads, periods)
     fit.unexplained += int((~inside.any(axis=0)).sum())
     chance = _by_chance(sensor, expected, spread, pose)
@@ -152,7 +148,7 @@ def _add_scan(fit: SensorFit, sensor: SensorModel, raw: Floats, pose: Floats, pr
         residual = wrap_periodic(measured[own] - expected[i], periods)[0] if len(own) == 1 else None
         cov = spreads[i, own[0]] if len(own) == 1 else spread[i]
         fit.matches.append(Match(labels[i], float(probabilities[i]), len(own), float(chance[i]), residual, cov))
-        fit.noise += noise[i]
+        fit.variances += np.diagonal(noise[i])
 
 
 def _inside(measured: Floats, expected: Floats, spread: Floats, periods: Floats, gate: float = GATE) -> Bools:

@@ -45,6 +45,7 @@ PLANE_SHAPES: dict[str, str] = {
     "range_only": "circle",
 }
 Scans: TypeAlias = tuple[tuple[Scan | None, ...], ...]
+Rows: TypeAlias = tuple[tuple[Floats | None, ...], ...]
 
 
 def measurement_code(scenario: Scenario) -> tuple[str, ...]:
@@ -78,10 +79,28 @@ def scans_of_record(record: RunRecord, scenario: Scenario) -> Scans:
     return scans_of_sensors(record, len(true), partial(sensors_at_step, true, scans_at))
 
 
-def _recorded(record: RunRecord, section: RecordingSection, scenario: Scenario) -> Scans:
+def rows_of_record(record: RunRecord, scenario: Scenario) -> Rows:
+    """Return for each step the measurements of each sensor, with the noise that rows of a recording bring, or None.
+
+    Raises `VedetteError` like `scans_of_record`.
+    """
+    section = scenario.model.recording
+    if section is not None:
+        return _recording_of(record, section, scenario).scans[: record.num_scans]
+    scans = scans_of_record(record, scenario)
+    return tuple(tuple(None if scan is None else scan.measurements for scan in instant) for instant in scans)
+
+
+def _recording_of(record: RunRecord, section: RecordingSection, scenario: Scenario) -> RecordedScans:
+    """Return the recording of a run; raises `InputError` for one of other scans."""
     recording = section.build(scenario.model, scenario.folder)
     if not np.array_equal(recording.times[: record.num_scans], record.times):
         raise InputError(f"{section.path}: expected the scans of the run; got others")
+    return recording
+
+
+def _recorded(record: RunRecord, section: RecordingSection, scenario: Scenario) -> Scans:
+    recording = _recording_of(record, section, scenario)
     dims = [len(COMPONENTS[sensor.measurement.kind]) for sensor in scenario.model.sensors]
     return tuple(
         tuple(

@@ -50,6 +50,8 @@ from vedette.recorded.tables import FARTHEST, LATEST, Table, is_empty, is_number
 from vedette.recorded.turns import bearings_of, scans_of_turns
 from vedette.simulation.records import ScansFile
 
+_OWN_POSE = ("own_x", "own_y", "own_lon", "own_lat", "own_heading")
+
 
 def parse_scans(
     table: Table, sites: Sequence[RecordedSensor], conventions: Conventions, origin: Origin | None = None
@@ -247,13 +249,11 @@ class _Rows(ScanColumns):
         """Return the pose of the sensor; the site gives what is not in the row."""
         site = self.sites[s]
         place: tuple[float, ...] = site.pose[:2]
-        columns = set(self._columns)
-        own = [name for name in ("own_x", "own_y", "own_lon", "own_lat", "own_heading") if name in columns]
-        if own and site.kind == "position" and all(self._is_blank(i, name) for name in own):
+        if site.kind == "position" and all(self._is_blank(i, name) for name in _OWN_POSE if name in self._columns):
             return tuple(site.pose)  # positions do not depend on it, and files of several sensors leave it empty
-        if {"own_lon", "own_lat"} <= columns:
+        if {"own_lon", "own_lat"} <= set(self._columns):
             place = self._agreed(i, self._plane(i, "own_lon", "own_lat"), "own_x", "own_y")
-        elif {"own_x", "own_y"} <= columns:
+        elif {"own_x", "own_y"} <= set(self._columns):
             place = self._value(i, "own_x"), self._value(i, "own_y")
         has_heading = "own_heading" in self._columns
         heading = self._angle(i, "own_heading", s, place) if has_heading else site.pose[2]
