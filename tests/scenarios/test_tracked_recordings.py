@@ -127,17 +127,19 @@ def test_results_of_earlier_versions_are_read(folder: Path) -> None:
     """They name no file of scans, and have empty tables of decisions."""
     assert call("track", "scans.csv", "--sensors", "radars.yaml", "--out", "out").exit_code == 0
     now, record = call("results", "out"), load_run(folder / "out")
-    save_run(
-        replace(record, recording=None),
-        folder / "out",
-        overwrite=True,
-        scenario_text=Path("out/scenario.yaml").read_text(),
-    )
+    old, text = replace(record, recording=None), Path("out/scenario.yaml").read_text()
+    fit = json.loads((folder / "out/manifest.json").read_text())["fit"]
+    save_run(old, folder / "out", overwrite=True, scenario_text=text, fit=fit)
     manifest = json.loads((folder / "out/manifest.json").read_text())
     assert "recording" not in manifest["run"]
     assert (folder / "out/decisions.arrow").exists()
     before = call("results", "out")
     assert (before.exit_code, before.stdout) == (0, now.stdout)
+    save_run(old, folder / "out", overwrite=True, scenario_text=text)  # from before runs had a fit
+    before = call("results", "out")
+    assert before.exit_code == 0
+    assert now.stdout.startswith(before.stdout)
+    assert now.stdout[len(before.stdout) :].startswith("fit  ")
     assert call("report", "out").exit_code == 0
 
 
