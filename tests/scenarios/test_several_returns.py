@@ -1,4 +1,4 @@
-"""Several returns a target: merged where that is asked for, warned of elsewhere; targets too fast are told of."""
+"""Several returns of a target are found and merged; unexplained measurements of fast targets are reported."""
 
 from __future__ import annotations
 
@@ -14,6 +14,7 @@ from vedette.evaluation.runs import run_scenario
 from vedette.evaluation.unexplained_courses import unexplained_course_warnings
 from vedette.recorded import RecordedScans, RecordedSensor
 from vedette.recorded.merging import merged
+from vedette.recorded.returns import Extent, ReturnsModel, extents_of
 from vedette.scenarios.from_recording import RecordingScenario, scenario_from_recording
 from vedette.scenarios.warnings import scenario_warnings
 
@@ -52,44 +53,72 @@ def recorded(
     return scenario_from_recording(folder / "radar.yaml", folder / "scans.csv", folder / "truth.csv")
 
 
-def test_several_returns_warn_and_are_merged(tmp_path: Path) -> None:
-    plain = recorded(tmp_path, 4.0)
-    (line,) = [line for line in scenario_warnings(plain.scenario) if "recording: {merge: 4.0}" in line]
-    assert "R: 40 of 40 scans have measurements within 3 standard deviations of each other" in line
-    apart = run_scenario(plain.scenario, "stationary", seed=0)
-    found = recorded(tmp_path, 4.0, ", merge: 4.0")
-    (line,) = [line for line in scenario_warnings(found.scenario) if "merged into" in line]
-    assert "its noise should cover that" in line
+def test_several_returns_are_found_and_merged(tmp_path: Path) -> None:
+    found = recorded(tmp_path, 4.0)
+    (line,) = [line for line in scenario_warnings(found.scenario) if "are taken for one target" in line]
+    assert "R: returns of a scan within" in line
     record = run_scenario(found.scenario, "stationary", seed=0)
+    plain = recorded(tmp_path, 4.0, ", extents: none")
+    assert not any("taken for one target" in line for line in scenario_warnings(plain.scenario))
+    apart = run_scenario(plain.scenario, "stationary", seed=0)
     assert found.recording.num_measurements < 0.5 * plain.recording.num_measurements
     numbers = [np.mean([len(each.labels) for each in run.estimates[10:]]) for run in (apart, record)]
     assert numbers[0] > 4.0
-    assert 2.5 < numbers[1] < 3.5
+    assert 2.8 < numbers[1] < 3.2
     assert record.ospa[10:, 0].mean() < 0.6 * apart.ospa[10:, 0].mean()
 
 
-def test_one_return_per_target_does_not_warn(tmp_path: Path) -> None:
-    assert not any("merge" in line for line in scenario_warnings(recorded(tmp_path, 1.0).scenario))
+@pytest.mark.parametrize("seed", range(3))
+def test_one_return_per_target_is_not_merged(tmp_path: Path, seed: int) -> None:
+    together = np.concatenate(
+        [CARS, CARS[:1] + np.array([6.0, 0.0, 0.0, 0.0])]
+    )  # two cars that keep three noise deviations
+    assert recorded(tmp_path, 1.0, targets=together, seed=seed).recording.notes == ()
+
+
+def test_another_sensor_with_one_return_shows_the_extent() -> None:
+    rng = np.random.default_rng(0)
+    ends = np.array([[-9.0, 0.0], [9.0, 0.0]])  # bow and stern, both nearly always seen
+    places = [np.array([300.0 + 3.0 * k, 200.0]) for k in range(60)]
+    both = [place + ends[rng.random(2) < 0.9] + rng.normal(0.0, 0.5, 2) for place in places]
+    one = [place + rng.normal(0.0, 3.0, (1, 2)) for place in places]
+    scans = tuple(zip(both, one, strict=True))
+    recording = RecordedScans(np.arange(60.0), 0.0, False, scans, np.zeros((60, 2, 3)), (), (None, None))
+    sites = [RecordedSensor(name, "position", (0.0, 0.0, 0.0)) for name in ("lidar", "radar")]
+    models = [ReturnsModel(None, (0.5, 0.5), 0.9), ReturnsModel(None, (3.0, 3.0), 0.9)]
+    lidar, radar = extents_of(recording, sites, models)
+    assert lidar is not None
+    assert radar is None
+    assert lidar.distance == pytest.approx(18.0, abs=1.0)
+    assert lidar.evidence == "radar has one there"
+    alone = RecordedScans(np.arange(60.0), 0.0, False, tuple((s,) for s in both), np.zeros((60, 1, 3)), (), (None,))
+    assert extents_of(alone, sites[:1], models[:1]) == [None]  # two boats would look the same
 
 
 def test_a_cluster_is_its_mean_across_the_end_of_bearings() -> None:
     scan = np.array([[math.pi - 0.001, 100.0], [-math.pi + 0.003, 104.0], [0.5, 100.0]])
     poses = np.zeros((1, 1, 3))
     recording = RecordedScans(np.zeros(1), 0.0, False, ((scan,),), poses, (), ("east",))
-    found = merged(recording, [RecordedSensor("R", "bearing_range", (0.0, 0.0, 0.0))], [(0.01, 2.0)], 4.0)
+    found = merged(recording, [RecordedSensor("R", "bearing_range", (0.0, 0.0, 0.0))], [Extent(6.0, "as given")])
     (own,) = found.scans[0]
     assert own is not None
-    np.testing.assert_allclose(own, [[-math.pi + 0.001, 102.0], [0.5, 100.0]])
-    assert found.notes == (
-        "R: 3 measurements merged into 2, spread bearing 0.115 deg, range 2 m; its noise should cover that",
+    np.testing.assert_allclose(own[:, :2], [[-math.pi + 0.001, 102.0], [0.5, 100.0]])
+    ends = np.array([[math.cos(each[0]) * each[1], math.sin(each[0]) * each[1]] for each in scan[:2]])
+    offsets = ends - [102.0 * math.cos(math.pi - 0.001), -102.0 * math.sin(math.pi - 0.001)]
+    variance = (offsets**2).sum() / 6.0  # of three measurements in two axes
+    np.testing.assert_allclose(-own[:, 2], variance / own[:, 1] ** 2)  # below zero: added to the noise of the sensor
+    np.testing.assert_allclose(-own[:, 4], variance)
+    assert found.notes[0].startswith(
+        "R: returns of a scan within 6 m of each other are taken for one target (as given): 3 measurements became 2, "
+        "their noise grew by"
     )
 
 
-def test_a_distance_below_zero_is_refused(tmp_path: Path) -> None:
+def test_an_extent_below_zero_is_refused(tmp_path: Path) -> None:
     recorded(tmp_path, 1.0)
-    text = (SENSORS % ", merge: 4.0").replace("merge: 4.0", "merge: -1.0")
+    text = (SENSORS % "").replace("name: R,", "name: R, extent: -1.0,")
     (tmp_path / "radar.yaml").write_text(text, "utf-8")
-    with pytest.raises(ScenarioError, match=r"recording\.merge"):
+    with pytest.raises(ScenarioError, match=r"sensors\[0\]\.extent"):
         scenario_from_recording(tmp_path / "radar.yaml", tmp_path / "scans.csv")
 
 

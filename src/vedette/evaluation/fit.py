@@ -174,7 +174,7 @@ def _detection_findings(fit: SensorFit) -> Iterator[tuple[str, str]]:
         yield (
             "several returns",
             f"tracks have {more.value:.1f} further measurements a scan beside them, more than clutter explains: if a "
-            "target gives several returns, give `recording: {merge: 4.0}`",
+            "target gives several returns, give the sensor its `extent` in m",
         )
 
 

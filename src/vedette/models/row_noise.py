@@ -141,8 +141,20 @@ def _sum(covs: Floats, added: Floats) -> Floats:
     """Return covariances (num, m, m) with others added; a variance left to the noise model is minus what is added."""
     total = covs + added
     for a in range(covs.shape[1]):
-        total[:, a, a] = np.where(covs[:, a, a] > 0.0, total[:, a, a], -added[:, a, a])
+        total[:, a, a] = np.where(covs[:, a, a] > 0.0, total[:, a, a], covs[:, a, a] - added[:, a, a])
     return total
+
+
+def with_added_noise(scan: Floats, added: Floats) -> Floats:
+    """Return a scan whose noise has covariances (num, m, m) in addition; its rows may bring their noise."""
+    dim = added.shape[1]
+    if scan.shape[1] == dim:
+        return with_row_noise(scan, np.zeros(added.shape), added=added)
+    out, (first, second), covs = scan.copy(), np.tril_indices(dim), np.zeros(added.shape)
+    lower = slice(dim, dim + len(first))
+    covs[:, first, second] = covs[:, second, first] = scan[:, lower]
+    out[:, lower] = _sum(covs, added)[:, first, second]
+    return out
 
 
 def measured_part(scan: Floats, meas_dim: int) -> Floats:

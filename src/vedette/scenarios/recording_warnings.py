@@ -10,13 +10,12 @@ from vedette.internal.quantities import PLACED
 from vedette.internal.text import pluralise
 from vedette.recorded import RecordedScans
 from vedette.recorded import RecordedTargets as RecordedSource
-from vedette.recorded.merging import crowded
 from vedette.recorded.tables import column_names
 from vedette.scenarios.diagnostics import Path, format_path
 from vedette.scenarios.loading import Scenario
 from vedette.scenarios.region import beyond_region_warnings
 from vedette.scenarios.sections import ScenarioModel
-from vedette.scenarios.sections.recording import noise_stds, recorded_sensors
+from vedette.scenarios.sections.recording import noise_stds
 from vedette.scenarios.sections.sensors import Sensor
 from vedette.scenarios.sections.targets import RecordedTargets
 from vedette.scenarios.sections.world import Time
@@ -32,7 +31,6 @@ def recording_warnings(scenario: Scenario) -> Iterator[tuple[Path, str]]:
         yield from _unused_columns(("recording", "path"), model.recording.path, recording.unused)
         yield from ((("recording", "path"), note) for note in recording.notes)
         yield from beyond_region_warnings(model, recording)
-        yield from _several_measurements_per_target(model, recording)
         yield from _large_scan_window(model, recording)
     if not isinstance(model.targets, RecordedTargets):
         return
@@ -65,18 +63,6 @@ def _single_reports(section: RecordedTargets, source: RecordedSource) -> Iterato
     if single:
         which = f"{pluralise(len(single), 'target')} with one report ({column_names(single)})"
         yield ("targets", "path"), f"targets.path: {section.path}: {which} left out, as a course needs two"
-
-
-def _several_measurements_per_target(model: ScenarioModel, recording: RecordedScans) -> Iterator[tuple[Path, str]]:
-    """Yield warnings of measurements so close together that one target seems to give several."""
-    stds = [noise_stds(sensor) for sensor in model.sensors]
-    for site, num, scans in crowded(recording, recorded_sensors(model), stds):
-        yield (
-            ("recording",),
-            f"{site.name}: {num} of {scans} scans have measurements within 3 standard deviations of each other; "
-            "filters take targets for points with one measurement a scan: if several are of one target, give "
-            "`recording: {merge: 4.0}`, which replaces such measurements by their mean",
-        )
 
 
 def _large_scan_window(model: ScenarioModel, recording: RecordedScans) -> Iterator[tuple[Path, str]]:

@@ -19,8 +19,11 @@ from vedette.scenarios.sections.field_of_view import max_range
 
 if TYPE_CHECKING:
     from vedette.recorded import Origin, RecordedScans, RecordedSensor
+    from vedette.recorded.returns import ReturnsModel
     from vedette.scenarios.sections.scenario import ScenarioModel
     from vedette.scenarios.sections.sensors import Sensor
+
+_ASSUMED_DETECTION = 0.9  # where a detection model has no constant probability
 
 
 class RecordingSection(Section):
@@ -61,10 +64,10 @@ class RecordingSection(Section):
         description="Whether a sensor without `turn` is taken for a turning radar where the bearings and times of its "
         "rows show that it is one; a scan is then one turn, whatever `scan_window` says [-].",
     )
-    merge: NonNegative = Field(
-        default=0.0,
-        description="Measurements of a scan within this number of noise standard deviations of each other, directly or "
-        "through others, become one at their mean, as targets are points to filters; 0: none do [-].",
+    extents: Literal["found", "none"] = Field(
+        default="found",
+        description="Whether sensors without `extent` get the extent that their scans show where targets give several "
+        "returns; a scan then has one measurement a target, with the mean of its returns and their spread [-].",
     )
     bad_rows: Literal["refuse", "skip"] = Field(
         default="refuse", description="Whether a row that cannot be read is an error, or left out and told of [-]."
@@ -87,25 +90,39 @@ class RecordingSection(Section):
         sites = recorded_sensors(world)
         if as_told:
             sites = [replace(site, bias=NO_BIAS) for site in sites]
-        recording = _read(str(file), changed, self.model_dump_json(), tuple(sites), origin)
-        if self.merge == 0.0:
-            return recording
-        from vedette.recorded.merging import merged
-
-        return merged(recording, sites, tuple(map(noise_stds, world.sensors)), self.merge)
+        return _read(str(file), changed, self.model_dump_json(), tuple(sites), tuple(_returns(world)), origin)
 
 
 @lru_cache(maxsize=4)
 def _read(
-    file: str, changed: tuple[int, int] | None, section: str, sites: tuple[RecordedSensor, ...], origin: Origin | None
+    file: str,
+    changed: tuple[int, int] | None,
+    section: str,
+    sites: tuple[RecordedSensor, ...],
+    returns: tuple[ReturnsModel, ...],
+    origin: Origin | None,
 ) -> RecordedScans:
     """Return the scans of a file with this time of change; the section is JSON, as mappings cannot be hashed."""
     from vedette.recorded import Conventions, parse_scans
     from vedette.recorded.files import read_table
+    from vedette.recorded.merging import merged
+    from vedette.recorded.returns import extents_of
 
     own = RecordingSection.model_validate_json(section)
     conventions = Conventions(own.columns, own.units, own.bearings, own.scan_window, own.bad_rows)
-    return parse_scans(read_table(file, sha256=own.sha256), sites, conventions, origin)
+    recording = parse_scans(read_table(file, sha256=own.sha256), sites, conventions, origin)
+    return merged(recording, sites, extents_of(recording, sites, returns))
+
+
+def _returns(world: ScenarioModel) -> Iterator[ReturnsModel]:
+    """Yield for each sensor its extent, or the assumed parameters that an extent is learnt from."""
+    from vedette.recorded.returns import ReturnsModel
+
+    learnt = world.recording is not None and world.recording.extents == "found"
+    for sensor in world.sensors:
+        extent = sensor.extent if sensor.extent is not None or learnt else 0.0
+        probability = float(getattr(sensor.detection, "probability", _ASSUMED_DETECTION))
+        yield ReturnsModel(extent, noise_stds(sensor), probability)
 
 
 def noise_stds(sensor: Sensor) -> tuple[float, ...] | None:

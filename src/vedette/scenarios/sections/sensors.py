@@ -17,6 +17,7 @@ from vedette.scenarios.diagnostics import Finding, describe
 from vedette.scenarios.sections.base import (
     GaussianMethod,
     Name,
+    NonNegative,
     Point,
     Positive,
     Probability,
@@ -195,6 +196,11 @@ class Sensor(Section):
         default=None,
         description="How its beam turns; none: its measurements are of one time, in a recording unless their bearings "
         "and times show a turn [-].",
+    )
+    extent: NonNegative | None = Field(
+        default=None,
+        description="Largest distance between neighbouring returns of one target in a recorded scan; 0: each "
+        "measurement is of a target of its own; none: as `recording.extents` says [m].",
     )
     noise: Noise = Field(
         default=of_kind("range_dependent"),
