@@ -11,8 +11,16 @@ import pytest
 
 from tracking.scenes import filters, lmb, rngs, scans_of, sensor, targets
 from vedette import models
+from vedette.densities import marginal_estimate
 from vedette.errors import InputError, ModelError
-from vedette.filters import LmbFilter, MultiSensorGlmbFilter, MultiSensorLmbFilter, PhdFilter, SequentialLmbFilter
+from vedette.filters import (
+    LmbFilter,
+    MultiSensorGlmbFilter,
+    MultiSensorLmbFilter,
+    PhdFilter,
+    SequentialFactoredFilter,
+    SequentialLmbFilter,
+)
 from vedette.fusion import Clmb, LabelMatchedFusion
 from vedette.fusion.matching import OWN_LABELS
 from vedette.models import BirthModel, MeasurementBirth
@@ -132,8 +140,13 @@ def test_a_bearing_and_range_give_a_position() -> None:
         noise=models.constant_noise([0.01]),
         clutter=models.measurement_space_clutter(1.0, [-3.0], [3.0], angular=[True]),
     )
-    with pytest.raises(InputError, match="births from measurements need a position"):
-        births_from_scans(BIRTH, NOBODY, [bearing], [np.array([[1.0]])], [pose], 2)
+    scans = [np.array([[1.0]]), np.array([[math.pi / 2, 50.0]])]
+    alone = births_from_scans(BIRTH, NOBODY, [bearing], scans[:1], [pose], 2)
+    assert alone is not None
+    assert len(alone.existence) == 0
+    both = births_from_scans(BIRTH, NOBODY, [bearing, polar], scans, [pose, pose], 2)
+    assert both is not None
+    np.testing.assert_array_equal(both.tracks.means, made.tracks.means)
     wrong = replace(polar, measurement=replace(polar.measurement, places=lambda z, pose: z[0]))
     with pytest.raises(ModelError, match="places of measurements"):
         births_from_scans(BIRTH, NOBODY, [wrong], [np.array([[1.0, 2.0]])], [pose], 2)
@@ -158,8 +171,6 @@ def test_targets_are_tracked_without_birth_sites(kind: Any) -> None:
         truth = TRUTH.copy()
         truth[:, :2] += step * truth[:, 2:]
         state, _ = tracker.step(state, scans_of(truth, SENSORS, POSES, rng), POSES, float(step), rngs=rngs(2))
-    from vedette.densities import marginal_estimate
-
     found = marginal_estimate(state.fused, 0.7).means
     assert len(found) == 3
     assert np.linalg.norm(found[:, None, :2] - truth[None, :, :2], axis=2).min(axis=0).max() < 10.0
@@ -172,12 +183,36 @@ def test_a_birth_needs_labels_and_a_fusion_that_matches_them() -> None:
         Distributed((PhdFilter(WORLD, SENSORS[0]),))
     placeless = replace(SENSORS[0], measurement=replace(SENSORS[0].measurement, places=None))
     wanted = r"sensors\[1\]\.measurement: expected a measurement with `places`, as targets are born of measurements"
-    for made in (
-        lambda: Distributed(filters(WORLD, (SENSORS[0], placeless)), LabelMatchedFusion(Clmb((0.5, 0.5)))),
-        lambda: Central(MultiSensorLmbFilter(WORLD, (SENSORS[0], placeless))),
-    ):
-        with pytest.raises(InputError, match=wanted):
-            made()
+    with pytest.raises(InputError, match=wanted):
+        Distributed(filters(WORLD, (SENSORS[0], placeless)), LabelMatchedFusion(Clmb((0.5, 0.5))))
+    with pytest.raises(InputError, match=wanted.replace("1", "0")):
+        Central(MultiSensorLmbFilter(WORLD, (placeless, placeless)))
+
+
+@pytest.mark.parametrize("kind", [SequentialLmbFilter, MultiSensorLmbFilter, SequentialFactoredFilter])
+def test_a_camera_sharpens_tracks_that_a_radar_starts(kind: Any) -> None:
+    radar = replace(SENSORS[0], noise=models.constant_noise([20.0, 3.0]))
+    camera = models.SensorModel(
+        models.bearing_only(),
+        models.constant_noise([0.01]),
+        models.constant_detection(0.9),
+        models.measurement_space_clutter(1.0, [-math.pi], [math.pi], angular=[True]),
+    )
+    poses = np.array([[0.0, 0.0, 0.0], [-300.0, 0.0, 0.0]])
+    errors = []
+    for sensors in ((radar,), (radar, camera)):
+        tracker, rng = Central(kind(WORLD, sensors)), np.random.default_rng(0)
+        state = tracker.initial()
+        for step in range(1, 30):
+            truth = TRUTH.copy()
+            truth[:, :2] += step * truth[:, 2:]
+            at = poses[: len(sensors)]
+            state, _ = tracker.step(state, scans_of(truth, sensors, at, rng), at, float(step), rngs=rngs(len(sensors)))
+        found = marginal_estimate(state.fused, 0.5).means
+        assert len(found) == 3
+        errors.append(np.linalg.norm(found[:, None, :2] - truth[None, :, :2], axis=2).min(axis=0).mean())
+    assert errors[1] < 0.7 * errors[0]
+
     for fields, name in (
         ({"expected": 0.0}, "expected"),
         ({"max_existence": 1.0}, "max_existence"),

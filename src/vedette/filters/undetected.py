@@ -33,7 +33,7 @@ def no_undetected(birth: BirthModel) -> Undetected:
     """Return the kernel input for an empty intensity of undetected targets."""
     dim, none = birth.state_dim, no_births(birth).undetected
     places, std, classes = np.empty((0, dim)), np.zeros(dim), birth.log_class_probs
-    return Undetected(none, np.empty((0, 0)), no_cells(dim), places, std, classes, 0, 0, 0.0)
+    return Undetected(none, np.empty((0, 0)), no_cells(dim), places, std, classes, 0, 0, 0.0, True)
 
 
 @lru_cache(maxsize=100)
@@ -111,14 +111,15 @@ def before_scan(
     if found is None or undetected.cells is None:
         return none._replace(intensity=intensity, step=step, first_index=index)
     places, std, learnt = none.places, none.std, undetected.birth_rate
-    if measured is not None and len(scan):
+    is_placed = measured is None or sensor.measurement.places is not None
+    if measured is not None and is_placed and len(scan):
         std = measured.std
         if is_turn(pose) and len(std) >= 4:  # a target moves until the beam passes it
             std = np.concatenate([np.hypot(std[:2], longest_lag(pose) * std[2:4]), std[2:]])
         places = sensor.measurement.states_at(scan, pose, len(std))
     rate = 0.0 if learnt is None else learnt.rate
     classes = none.log_class_probs
-    return Undetected(intensity, tables_of(undetected), found.cells, places, std, classes, step, index, rate)
+    return Undetected(intensity, tables_of(undetected), found.cells, places, std, classes, step, index, rate, is_placed)
 
 
 def after_scan(before: UndetectedTargets, missed: Mixture, left: Left, num_measurements: int) -> UndetectedTargets:

@@ -42,12 +42,15 @@ class UnexplainedMeasurements(NamedTuple):
     sensors: Ints  # (num,) number of the sensor that measured it
 
 
-def check_measured_births(birth: BirthModel, sensors: Sequence[SensorModel]) -> None:
-    """Raise `InputError` for births from measurements if a sensor's measurements cannot be placed (no `places`)."""
-    for s, sensor in enumerate(sensors):
-        if birth.from_measurements is not None and sensor.measurement.places is None:
-            expected = "a measurement with `places`, as targets are born of measurements"
-            raise reject(f"sensors[{s}].measurement", expected, "one without")
+def check_measured_births(birth: BirthModel, sensors: Sequence[SensorModel], *, each: bool) -> None:
+    """Raise `InputError` for births from measurements if these cannot be placed (no `places`).
+
+    each: True if every sensor starts tracks by itself; else one sensor with places is enough.
+    """
+    without = [s for s, sensor in enumerate(sensors) if sensor.measurement.places is None]
+    if birth.from_measurements is not None and without and (each or len(without) == len(sensors)):
+        expected = "a measurement with `places`, as targets are born of measurements"
+        raise reject(f"sensors[{without[0]}].measurement", expected, "one without")
 
 
 def tracker_births(birth: BirthModel, local: Any) -> BirthModel:
@@ -95,6 +98,8 @@ def births_from_scans(
 ) -> LMB | None:
     """Return the birth candidates for `step` from the scans before it; several sensors' measurements are pooled.
 
+    Sensors whose measurements have no places, such as cameras, make none.
+
     Args:
         birth: birth model; None is returned if its `from_measurements` is None.
         belief: belief after those scans.
@@ -112,6 +117,7 @@ def births_from_scans(
     parameters = BirthsOfMeasurements(
         model.std, birth.log_class_probs, float(model.expected), float(model.max_existence), step, first
     )
+    scans = [scan if sensor.measurement.places else None for sensor, scan in zip(sensors, scans, strict=True)]
     scanned = [s for s, scan in enumerate(scans) if scan is not None]
     checked = [pose_vector("pose", poses[s]) for s in scanned]
     if len(scanned) == 1:

@@ -68,7 +68,7 @@ class MultiSensorFilterTracker:
     def __post_init__(self) -> None:
         if not isinstance(self.filter, CentralFilter):
             raise reject("filter", "one of several sensors, with targets, sensors, initial() and step()", self.filter)
-        check_measured_births(self.targets.birth, self.sensors)
+        check_measured_births(self.targets.birth, self.sensors, each=False)
 
     @property
     def targets(self) -> TargetModel:

@@ -61,7 +61,7 @@ class LocalFilters:
         object.__setattr__(self, "sensors", tuple(local.sensor for local in self.filters))
         object.__setattr__(self, "_are_builtin", all(isinstance(local, SingleSensorFilter) for local in self.filters))
         birth = self.targets.birth
-        check_measured_births(birth, self.sensors)
+        check_measured_births(birth, self.sensors, each=True)
         for s in range(len(self.filters)):
             if birth.from_measurements is not None:
                 self._predict_update_filter(s, _MEASURED_BIRTHS)

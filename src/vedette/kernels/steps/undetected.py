@@ -58,6 +58,7 @@ class Undetected(NamedTuple):
     step: int  # of the labels
     first_index: int  # of the label of the scan's first measurement
     birth_rate: float  # 1/s, if it is learnt and the second table is of it
+    is_placed: bool  # the sensor says where targets are; the scan of another changes nothing in the cells
 
 
 @inlined
@@ -160,6 +161,7 @@ def predicted_undetected(before: Undetected, motion: Motion, dt: float, arrivals
         before.step,
         before.first_index,
         before.birth_rate,
+        before.is_placed,
     )
 
 
@@ -216,8 +218,8 @@ def left_in_cells(undetected: Undetected, sensor: Sensor, pose: Floats) -> Left:
     shares = np.empty(len(undetected.places) if len(tables) > 1 else 0)
     for j in range(len(shares)):
         shares[j] = _share_born(undetected, undetected.places[j])
-    if len(tables) == 0:
-        return Left(tables, np.empty(0), shares)
+    if len(tables) == 0 or not undetected.is_placed:
+        return Left(tables, np.zeros(len(tables)), shares)
     left = take_out_detected(sensor, pose, cells.states, cells.node_weights, tables)
     return Left(left, left.sum(axis=1) - tables.sum(axis=1), shares)
 

@@ -70,10 +70,11 @@ def births_from_measurements(model: ScenarioModel) -> Iterator[Finding]:
         yield (*path, "std"), f"{dim} numbers, as a state under motion has", describe(measured.std)
     if model.filter.kind in UNLABELLED:
         yield path, f"none, as {model.filter.kind} filters have no labels", "births from measurements"
-    for i, sensor in enumerate(model.sensors):
-        if sensor.measurement.kind not in (*PLACED, "custom"):
+    without = [i for i, sensor in enumerate(model.sensors) if sensor.measurement.kind not in (*PLACED, "custom")]
+    if isinstance(fusion, Fusion) or len(without) == len(model.sensors):  # each of the sensors that are fused by it
+        for i in without:
             wanted = "a measurement that says where a target is, for birth.from_measurements"
-            yield ("sensors", i, "measurement", "kind"), wanted, describe(sensor.measurement.kind)
+            yield ("sensors", i, "measurement", "kind"), wanted, describe(model.sensors[i].measurement.kind)
     if len(model.sensors) > 1 and isinstance(fusion, Fusion) and fusion.kind in LABEL_FUSIONS:
         when = "without feedback" if not fusion.feeds_back else None if model.network is None else "over a network"
         if when is not None and fusion.matching == "labels":
