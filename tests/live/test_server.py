@@ -291,8 +291,9 @@ def test_the_client_that_was_silent_longest_is_disconnected(limit: str, monkeypa
     assert [text.split(" was ")[1].split(" for ")[0] for text in served(scene)] == ["silent"]
 
 
-def test_clients_without_a_valid_line_make_way_at_once(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_clients_without_a_valid_line_make_way_sooner(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(server, "MAX_CLIENTS", 2)
+    monkeypatch.setattr(server, "FIRST_LINE_SECONDS", 0.0)
 
     async def scene(client: Callable[[], Awaitable[Client]]) -> None:
         first = await client()

@@ -26,6 +26,7 @@ MAX_CLIENTS_PER_ADDRESS = 64  # clients per address
 MAX_WAITING = 32  # further connections that have not entered
 BACKLOG = 16  # connections accepted before any of them is counted
 IDLE_SECONDS = 60.0  # silence after which a client may be disconnected to make room
+FIRST_LINE_SECONDS = 10.0  # the same for a client that has not sent a valid line
 WRONG_TOKEN_DELAY = 1.0  # delay of the answer to a wrong token
 MIN_TOKEN_LENGTH = 16  # letters
 MAX_UNREAD_BYTES = 8_000_000  # bytes of answers that a client has not read
@@ -89,7 +90,7 @@ class LineServer:
     served; no queue builds up. A client that does not read its answers is disconnected. A client enters after its token
     or its handshake. If more than `MAX_WAITING` have not entered, the first client of the address with the most of
     them is disconnected. If there is no room, a client that was silent for `IDLE_SECONDS`, or has not sent a valid line
-    yet, is disconnected.
+    within `FIRST_LINE_SECONDS`, is disconnected.
 
     Args:
         process: function that processes a line and returns its answers.
@@ -148,7 +149,8 @@ class LineServer:
         silent = [
             (since, entered)
             for entered, since in self._entered.items()
-            if now - since >= (IDLE_SECONDS if entered in self._senders else 0.0) and address in (None, entered.address)
+            if now - since >= (IDLE_SECONDS if entered in self._senders else FIRST_LINE_SECONDS)
+            and address in (None, entered.address)
         ]
         if not silent:
             return False
