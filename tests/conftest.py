@@ -30,11 +30,12 @@ def browser() -> Iterator[Browser]:
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
-    """How long the fuzzers of `tests/fuzz` go on, and from where."""
+    """How long the fuzzers of `tests/fuzz` go on, and from where, and how many faults `tests/cli` injects."""
     group = parser.getgroup("fuzz")
     group.addoption("--fuzz-seconds", type=float, help="seconds for each fuzzer (default: a fixed number of cases)")
     group.addoption("--fuzz-seed", type=int, default=0, help="seed of the cases (default: 0)")
     group.addoption("--fuzz-case", type=int, help="try only the case of this number")
+    group.addoption("--fault-rounds", type=int, default=2, help="rounds of injected faults for each command")
 
 
 def pytest_sessionfinish() -> None:

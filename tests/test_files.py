@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from vedette.internal.files import write_whole
+from vedette.internal.files import lock_beside, sweep, write_whole
 
 
 def test_a_file_appears_whole_and_readable_by_others(tmp_path: Path) -> None:
@@ -34,3 +34,15 @@ def test_a_fault_half_way_leaves_what_was_there(tmp_path: Path) -> None:
     assert [path.name for path in tmp_path.iterdir()] == ["file"]
     with pytest.raises(FileNotFoundError):
         write_whole(tmp_path / "nowhere" / "file", lambda file: file.write(b""))
+
+
+def test_what_killed_processes_leave_is_deleted_under_the_lock(tmp_path: Path) -> None:
+    left = [tmp_path / f".{name}.{'0a1b' * 8}" for name in ("state", "other")]
+    kept = [tmp_path / name for name in (".state.yaml", "state", f"state.{'0a1b' * 8}")]
+    for path in (*left, *kept):
+        path.touch()
+    lock_beside(tmp_path / "state").close()
+    assert [path.exists() for path in left] == [False, True]
+    sweep(tmp_path)
+    assert not left[1].exists()
+    assert all(path.exists() for path in kept)

@@ -8,6 +8,7 @@ import subprocess
 import sys
 import threading
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -53,25 +54,33 @@ def is_there(process: int) -> bool:
     return not state.exists() or " Z " not in state.read_text()  # ended, and not asked for by who took it over
 
 
+PIPED: Any = {"stdin": subprocess.PIPE, "text": True}
+
+
+@pytest.mark.skipif(os.name == "nt", reason="signals differ there")
 def test_children_are_started_deaf_to_interrupts_and_with_one_thread(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("MKL_NUM_THREADS", "3")
     monkeypatch.delenv("OMP_NUM_THREADS", raising=False)
     before = signal.getsignal(signal.SIGINT)
     with as_children():
-        assert signal.getsignal(signal.SIGINT) == signal.SIG_IGN
+        child = subprocess.Popen([sys.executable, "-c", "import sys; sys.exit(sys.stdin.read() != 'go')"], **PIPED)
         assert (os.environ["OMP_NUM_THREADS"], os.environ["MKL_NUM_THREADS"]) == ("1", "3")
     assert signal.getsignal(signal.SIGINT) == before
     assert "OMP_NUM_THREADS" not in os.environ
     assert os.environ["MKL_NUM_THREADS"] == "3"
+    child.send_signal(signal.SIGINT)
+    child.communicate("go", timeout=PATIENCE)
+    assert child.returncode == 0
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="processes are not forks of a server there")
-def test_ctrl_c_while_forks_of_a_server_start_is_not_lost() -> None:
+@pytest.mark.parametrize("of_server", [False, True])
+def test_ctrl_c_while_processes_start_is_not_lost(of_server: bool) -> None:
     before = signal.signal(signal.SIGINT, signal.default_int_handler)  # what is started in the background ignores it
     reached = []
 
     def start() -> None:
-        with as_children(of_server=True):
+        with as_children(of_server=of_server):
             signal.raise_signal(signal.SIGINT)
             reached.append("the end")
 

@@ -154,8 +154,10 @@ def test_what_a_start_killed_early_leaves_is_gone_on_with(tmp_path, campaign):
     folder = tmp_path / "results"
     folder.mkdir()
     (folder / "campaign.lock").touch()
-    (folder / ".manifest.json.0123").write_text("{")
+    (folder / "campaign.lock-journal").touch()
+    (folder / f".manifest.json.{'0123' * 8}").write_text("{")
     Store.open(folder, campaign).close()
+    assert {path.name for path in folder.iterdir()} == {"campaign.lock", "campaign.sqlite", "manifest.json"}
     (folder / "campaign.sqlite").unlink()
     fill(folder, campaign)
     assert len(list(open_results(folder).runs())) == len(campaign.tasks)

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import shutil
+
 import pytest
 from typer.testing import CliRunner
 
 from vedette.campaigns import open_results
-from vedette.cli import app
+from vedette.cli import app, running
 from vedette.errors import NumericalError
 from vedette.filters import DeltaGlmbFilter
 from vedette.scenarios import list_builtin
@@ -97,6 +99,32 @@ def test_ctrl_c_during_figures_reports_that_the_run_is_saved(scenario_file, tmp_
     assert result.exit_code == 130
     assert f"interrupted: wrote {tmp_path / 'results'}, but not all of its figures" in result.stderr
     assert load_run(tmp_path / "results").num_scans == 10
+    monkeypatch.undo()
+    again = call("run", scenario_file, "--planner", "random", "--out", tmp_path / "results")
+    assert again.exit_code == 0, again.output  # the folder was unfinished
+    assert load_run(tmp_path / "results").planner == "random"
+    assert call("run", scenario_file, "--planner", "idm", "--out", tmp_path / "results").exit_code == 1
+
+
+def test_a_run_that_another_process_wrote_meanwhile_is_kept(scenario_file, tmp_path, monkeypatch):
+    out, simulate = tmp_path / "results", running._simulate
+
+    def slow(*arguments):
+        monkeypatch.setattr(running, "_simulate", simulate)
+        other = call("run", scenario_file, "--planner", "random", "--out", out, "--overwrite")
+        assert other.exit_code == 0, other.output
+        return simulate(*arguments)
+
+    for words in ([], ["--overwrite"]):
+        monkeypatch.setattr(running, "_simulate", slow)
+        result = call("run", scenario_file, "--planner", "stationary", "--out", out, *words)
+        assert result.exit_code == 0, result.output
+        assert f"{out} has changed since this command started; it is kept" in result.stderr
+        assert load_run(out).planner == "random"
+        number = len(words) + 2
+        assert load_run(tmp_path / f"results-{number}").planner == "stationary"
+        if not words:
+            shutil.rmtree(out)
 
 
 def test_a_run_that_stops_at_once_writes_nothing(scenario_file, tmp_path, monkeypatch):

@@ -57,6 +57,21 @@ def test_tracks_are_joined_across_gaps_unless_that_is_switched_off(place: Path) 
     assert len({row["track"] for row in joined}) == len({row["label"] for row in joined}) - 3
 
 
+def test_tables_are_written_before_the_joins(place: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def interrupted(*_: object, **__: object) -> None:
+        raise KeyboardInterrupt
+
+    words = ("scans.csv", "--sensors", "radars.yaml", "--out", "out")
+    with monkeypatch.context() as patch:
+        patch.setattr("vedette.evaluation.joining.joins_of_run", interrupted)
+        result = call(*words)
+    assert (result.exit_code, load_run(place / "out").num_scans > 0) == (130, True)
+    assert "wrote out, but not all of its tracks and figures; the same command starts anew" in result.stderr
+    assert call(*words).exit_code == 0
+    assert (place / "out/tracks/tracks.csv").exists()
+    assert call(*words).exit_code == 1
+
+
 def test_a_mistyped_file_name_is_in_the_message(place: Path) -> None:
     assert call("scnas.csv", "--sensors", "radars.yaml").stderr == (
         "scnas.csv: no such file; expected a file of scans\n"

@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import errno
 import subprocess
 import sys
 from collections.abc import Callable
@@ -228,8 +229,19 @@ def test_saving_refuses_unknown_formats_and_places(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="expected some of pdf, svg, png; got gif"):
         save_figure(figure, tmp_path / "figure", formats=("gif",))
     (tmp_path / "file").write_text("")
-    with pytest.raises(InputError, match="expected a place to write figures"):
+    with pytest.raises(InputError, match=r"file/figure\.pdf: expected a file that can be written"):
         save_figure(figure, tmp_path / "file" / "figure")
+
+
+def test_a_full_disk_is_reported_by_name(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def full(_: int) -> None:
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    monkeypatch.setattr("os.fsync", full)
+    for name in ("pdf", "png"):
+        with pytest.raises(InputError, match=rf"figure\.{name}: expected a file that can be written; No space left"):
+            save_figure(reward_figure(plan("idm")), tmp_path / "figure", formats=(name,))
+    assert not list(tmp_path.iterdir())
 
 
 def test_global_settings_are_left_alone() -> None:

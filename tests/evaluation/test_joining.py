@@ -8,10 +8,12 @@ from typing import Any
 
 import numpy as np
 import pytest
+from scipy.optimize import linear_sum_assignment
 
 from vedette import models
 from vedette.densities import Estimate, track_histories
 from vedette.errors import InputError
+from vedette.evaluation import gaps
 from vedette.evaluation.gaps import gap_log_ratios
 from vedette.evaluation.joining import find_joins, track_names
 from vedette.evaluation.observation_history import ObservationHistory, birth_count_ratio
@@ -100,6 +102,15 @@ def scene() -> tuple[list[Estimate], float, tuple[Any, Any], list[Any]]:
     return estimates_of(rows), total, ended, zs
 
 
+def dense(estimates: list[Estimate], observations: ObservationHistory) -> Any:
+    """The log ratio of each pair of labels, -inf of those that are left out."""
+    histories = track_histories(estimates, observations.times)
+    ratios = np.full((len(histories), len(histories)), -np.inf)
+    pairs = gap_log_ratios(histories, observations)
+    ratios[pairs.ended, pairs.began] = pairs.log_ratios
+    return ratios
+
+
 @pytest.mark.parametrize("hidden", [0.0, 0.3, 1.0])
 def test_the_ratio_of_a_gap_is_that_of_enumeration(hidden: float) -> None:
     estimates, log_born, (mean, cov), zs = scene()
@@ -115,7 +126,7 @@ def test_the_ratio_of_a_gap_is_that_of_enumeration(hidden: float) -> None:
         log_same += log
     # One label of three estimates; .01 births are expected.
     expected = log_same - np.log(1.5 / 0.51 + 0.1 / 0.9) - np.log(gone(0.8, hidden)) - np.log(SITE[2]) - log_born
-    ratios = gap_log_ratios(track_histories(estimates, observations.times), observations)
+    ratios = dense(estimates, observations)
     assert ratios[0, 1] == pytest.approx(expected, abs=1e-7)
     assert (ratios[[0, 1, 1], [0, 0, 1]] == -np.inf).all()
     joins = find_joins(estimates, observations, threshold=0.0)
@@ -128,9 +139,9 @@ def test_scans_that_did_not_take_place_miss_nothing() -> None:
     estimates, *_ = scene()
     scanned = np.ones((ENDS, 1), np.bool_)
     scanned[LAST : BEGINS - 1] = False
-    histories, missed = track_histories(estimates, make_observations(0.0).times), make_observations(0.0)
+    missed = make_observations(0.0)
     blind, unseen = make_observations(0.0, scanned=scanned), make_observations(1.0)
-    ratio, least, most = (gap_log_ratios(histories, observations)[0, 1] for observations in (blind, missed, unseen))
+    ratio, least, most = (dense(estimates, observations)[0, 1] for observations in (blind, missed, unseen))
     assert least < ratio
     log_seen = np.log(gone(0.8, 1.0))
     assert ratio > most + log_seen  # of no scan the hypothesis that the target died is no more probable
@@ -145,6 +156,53 @@ def test_one_of_two_ended_labels_continues() -> None:
     (join,) = find_joins(estimates, observations, threshold=0.0)
     assert join.probability == pytest.approx(0.5, abs=0.02)
     assert find_joins(estimates, observations, threshold=0.6) == ()
+
+
+def joins_of_dense(estimates: list[Estimate], observations: ObservationHistory) -> list[tuple[Any, Any, float]]:
+    """The joins by whole matrices and a dense assignment."""
+    ratios = dense(estimates, observations)
+    rows, columns = (np.logaddexp.reduce(ratios, axis=axis) for axis in (1, 0))
+    others = np.logaddexp(rows[:, None], columns)
+    with np.errstate(invalid="ignore"):
+        own = np.where(ratios > -np.inf, np.exp(ratios - others), 0.0)
+    probabilities = np.exp(ratios - np.logaddexp(0.0, others + np.log1p(-np.minimum(own, 0.5))))
+    gains = np.maximum(ratios, 0.0)
+    labels = [history.label for history in track_histories(estimates, observations.times)]
+    chosen = zip(*linear_sum_assignment(gains, maximize=True), strict=True)
+    return sorted(
+        ((labels[i], labels[j], float(probabilities[i, j])) for i, j in chosen if gains[i, j] > 0.0),
+        key=lambda join: join[1],
+    )
+
+
+def random_estimates(rng: np.random.Generator) -> list[Estimate]:
+    """Short tracks that begin near where others end, and elsewhere."""
+    rows: dict[int, list[Any]] = {}
+    places = rng.uniform(-200.0, 200.0, (rng.integers(1, 4), 2))
+    for number in range(rng.integers(2, 25)):
+        first = int(rng.integers(1, ENDS + 1))
+        state = np.concatenate([places[rng.integers(len(places))] + rng.normal(0.0, 15.0, 2), rng.normal(0.0, 3.0, 2)])
+        for step in range(first, min(first + int(rng.integers(1, 4)), ENDS + 1)):
+            cov = np.diag(rng.uniform([4.0, 4.0, 0.5, 0.5], [30.0, 30.0, 4.0, 4.0]))
+            rows.setdefault(step, []).append(((first, number), state, cov, float(rng.uniform(0.3, 0.99))))
+            state = F @ state + rng.normal(0.0, 1.0, 4)
+    return estimates_of(rows)
+
+
+def test_joins_are_those_of_whole_matrices(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Pairs that are left out change no bit, and rivals are resolved as by a dense assignment."""
+    numbers, left_out = [], 0
+    for seed in range(60):
+        estimates, observations = random_estimates(np.random.default_rng(seed)), make_observations(0.5)
+        joins = find_joins(estimates, observations, threshold=0.0)
+        num_pairs = np.isfinite(dense(estimates, observations)).sum()
+        with monkeypatch.context() as patch:
+            patch.setattr(gaps, "LEAST_LOG_RATIO", -1e300)
+            left_out += np.isfinite(dense(estimates, observations)).sum() - num_pairs
+            assert list(joins) == joins_of_dense(estimates, observations)
+        numbers.append(len(joins))
+    assert left_out > 0
+    assert max(numbers) > 2
 
 
 def test_tracks_are_named_by_their_first_label() -> None:
@@ -182,7 +240,7 @@ def test_births_are_counted_by_labels_that_last(expected: Any, period: float | N
     observations = make_observations(0.5, targets=targets_of(region, expected, period))
     histories = track_histories(estimates, observations.times)
     assert birth_count_ratio(histories, observations) == pytest.approx(births)
-    assert np.isfinite(gap_log_ratios(histories, observations)[0, 1])
+    assert np.isfinite(dense(estimates, observations)[0, 1])
 
 
 def test_births_need_a_region() -> None:

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import asyncio
 import itertools
+import os
 from pathlib import Path
 from typing import Any
 
@@ -11,6 +13,7 @@ import pytest
 from live.examples import answered, line, small, walk
 from vedette.errors import InputError
 from vedette.live import MAX_LINE_BYTES, LineSplitter, LiveLoop, PersistentLoop, encode_line
+from vedette.live.lines import iter_lines
 
 LINES = [*walk(7), b"{", line("nobody"), *walk(9)[14:]]
 
@@ -123,7 +126,32 @@ def test_a_full_disk_is_reported_and_a_device_is_no_record(tmp_path: Path, live:
         def write(self, _: bytes) -> None:
             raise OSError(28, "No space left on device")
 
+        def close(self) -> None:
+            self.write(b"what is left")
+
     persistent.close()
     persistent._record = Full()  # type: ignore[assignment]
     with pytest.raises(InputError, match="record: expected room for the record; No space left on device"):
         persistent.process(LINES[0])
+    persistent.close()
+
+
+def test_the_reader_of_a_pipe_outlives_an_interrupted_loop_in_silence() -> None:
+    """What it raised in its thread would be an error of this test. The end that it reads stays open."""
+    reading, writing = os.pipe()
+
+    class Source:
+        def fileno(self) -> int:
+            return reading
+
+    async def interrupted() -> None:
+        lines = iter_lines(Source())
+        os.write(writing, b"first\n")
+        assert await anext(lines) == b"first"
+        os.write(writing, b"second\n")
+        raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        asyncio.run(interrupted())
+    os.write(writing, b"third\n")
+    os.close(writing)

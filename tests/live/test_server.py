@@ -291,6 +291,26 @@ def test_the_client_that_was_silent_longest_is_disconnected(limit: str, monkeypa
     assert [text.split(" was ")[1].split(" for ")[0] for text in served(scene)] == ["silent"]
 
 
+def test_clients_without_a_valid_line_make_way_sooner(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(server, "MAX_CLIENTS", 2)
+    monkeypatch.setattr(server, "FIRST_LINE_SECONDS", 0.0)
+
+    async def scene(client: Callable[[], Awaitable[Client]]) -> None:
+        first = await client()
+        await first.send(b"word\n")
+        await first.hears({"line": "word"})
+        for _ in range(3):
+            silent = await client()
+            await silent.send(b"bad\n")
+            await silent.hears({"error": "bad"})
+        last = await client()
+        await last.send(b"mine\n")
+        assert await last.answer() == {"line": "mine"}
+        assert await first.answer() == {"line": "mine"}
+
+    assert all(" was silent" in text for text in served(scene))
+
+
 def test_wrong_tokens_are_delayed_and_reported_once(monkeypatch: pytest.MonkeyPatch) -> None:
     waited, wrong = list[float](), server.WRONG_TOKEN_DELAY
 

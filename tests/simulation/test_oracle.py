@@ -16,6 +16,7 @@ from vedette.densities import LMB
 from vedette.errors import InputError
 from vedette.models import Region
 from vedette.platforms import Actions, HeadingPlatform, Operated
+from vedette.platforms.base import actions_at, courses_of, scans_of
 from vedette.scenarios import load_scenario, replace_fields
 from vedette.scenarios.build import build_experiment, build_planner, build_sensors
 from vedette.simulation import OraclePlanner, RequiresTruth, Schedule, Truth, simulate
@@ -165,6 +166,15 @@ def test_who_is_off_tells_nothing() -> None:
         plans.append(planner.plan(state(), POSES, rng=np.random.default_rng(0)))
     assert plans[1].chosen == plans[0].chosen
     assert plans[1].chosen_actions[1][-1] == 0.0
+
+
+def test_a_decision_at_the_last_scan_with_a_budget_is_made() -> None:
+    """No scan follows, for which the seconds left would be worked out."""
+    budgeted = Operated(SENSORS[0].platform, switchable=True, budget=60.0)
+    pose = np.array([0.0, 40.0, 0.0, 0.0, 0.0, 60.0])
+    actions = actions_at("platform", budgeted, pose).values
+    assert courses_of("platform", budgeted, pose, actions, np.empty(0)).shape == (len(actions), 0, 6)
+    assert scans_of("platform", budgeted, pose, actions, np.empty(0)).shape == (len(actions), 0)
 
 
 def test_what_is_lost_is_given_up_where_nothing_is_born() -> None:

@@ -16,7 +16,7 @@ from live.examples import small
 from vedette.densities import Estimate
 from vedette.errors import InputError, ScenarioError
 from vedette.evaluation import track_recording
-from vedette.evaluation.gaps import _log_class_ratios
+from vedette.evaluation.gaps import GapRatios, _likely_pairs
 from vedette.evaluation.joining import joins_of_run, with_joined_tracks
 from vedette.evaluation.scans import scan_table
 from vedette.evaluation.track_table import table_of_run, write_tracks
@@ -268,7 +268,9 @@ def test_labels_of_other_classes_are_not_joined(run: Any) -> None:
         def __init__(self, own: Any) -> None:
             self.class_probs = own[np.newaxis]
 
-    logs = _log_class_ratios([History(own) for own in probs], birth)  # type: ignore[misc]
+    ended, began = (index.ravel() for index in np.indices((2, 2)))
+    histories: Any = [History(own) for own in probs]
+    logs = _likely_pairs([GapRatios(ended, began, np.zeros(4))], histories, birth).log_ratios.reshape(2, 2)
     for i, first in enumerate(probs):
         for j, second in enumerate(probs):
             likelihood = second / PROBS  # of the features of the second, up to a factor

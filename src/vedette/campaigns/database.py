@@ -175,7 +175,7 @@ def translated_errors(path: Path, where: str = "") -> Iterator[None]:
 def _advice(path: Path, error: Exception) -> str:
     primary = _code(error) & 0xFF
     if primary in (sqlite3.SQLITE_FULL, sqlite3.SQLITE_IOERR):
-        return "expected room on the disk and a disk that works; what was finished before is kept: make room, go on"
+        return "expected room on the disk and a disk that works; no finished run is lost: make room, go on"
     if primary in (sqlite3.SQLITE_CANTOPEN, sqlite3.SQLITE_READONLY, sqlite3.SQLITE_PERM):
         return "expected a file that can be opened" if path.exists() else "expected the runs of a campaign; got no file"
     if primary == sqlite3.SQLITE_BUSY:

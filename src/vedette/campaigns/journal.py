@@ -11,6 +11,7 @@ from typing import Any
 from vedette.campaigns import database
 from vedette.campaigns.rows import Entry, Row, pack, unpack, verified
 from vedette.errors import InputError
+from vedette.internal.files import sweep
 
 _INSERT = f"INSERT INTO runs ({database.COLUMNS}) VALUES ({', '.join('?' * (database.COLUMNS.count(',') + 1))})"
 
@@ -21,6 +22,7 @@ class Writer:
     def __init__(self, folder: Path) -> None:
         self._path = folder / database.DATABASE
         self._lock = database.lock_of(folder)
+        sweep(folder)
         self._opened: sqlite3.Connection | None = None
 
     @property

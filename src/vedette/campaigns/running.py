@@ -23,6 +23,7 @@ from vedette.errors import InputError, VedetteError
 from vedette.evaluation.metrics import encode_metrics
 from vedette.evaluation.runs import custom_metrics
 from vedette.internal.extras import require_packages
+from vedette.internal.files import sweep
 from vedette.internal.text import pluralise
 
 TABLES = "tables"
@@ -129,9 +130,10 @@ def run_campaign(
                         failed.append(result)
                         store.note_failure(result.cell, result.run, result.message)
                         progress.failed(result)
-    if campaign.shard.count == 1:  # tables of shards are written when they are merged
-        # Always, to repair tables that an interrupted call left or that were altered.
-        export_tables(open_results(folder, campaign=campaign), Path(folder) / TABLES)
+        if campaign.shard.count == 1:  # tables of shards are written when they are merged
+            # Always, to repair tables that an interrupted call left or that were altered.
+            sweep(Path(folder) / TABLES)
+            export_tables(open_results(folder, campaign=campaign), Path(folder) / TABLES)
     return CampaignOutcome(num_completed, num_existing, tuple(failed))
 
 

@@ -144,7 +144,8 @@ def _check_place(folder: Path) -> None:
         return
     if not folder.is_dir():
         raise InputError(f"{folder}: expected a folder for results; got a file")
-    names = {path.name for path in folder.iterdir() if not path.name.startswith(f".{MANIFEST}.")} - {LOCK}
+    names = {path.name for path in folder.iterdir() if not path.name.startswith(f".{MANIFEST}.")}
+    names -= {LOCK, f"{LOCK}-journal"}
     if DATABASE in names:
         raise InputError(f"{folder}: expected {MANIFEST} beside {DATABASE}; it is missing, nothing was changed")
     if names:

@@ -22,6 +22,7 @@ from vedette.internal.extras import require_packages
 from vedette.internal.text import pluralise
 
 if TYPE_CHECKING:
+    from vedette.evaluation.fit import Fit
     from vedette.scenarios import Scenario
     from vedette.simulation.journal import RunInterrupted, RunStopped
     from vedette.simulation.records import RunRecord
@@ -46,6 +47,44 @@ def interruptible(advice: str) -> Iterator[None]:
     except KeyboardInterrupt:
         echo_error(f"\ninterrupted: {advice}")
         raise typer.Exit(INTERRUPTED) from None
+
+
+def check_out(out: Path | None, overwrite: bool) -> tuple[int, ...]:
+    """Check the folder of `--out`, if it is given; return the identity of the run in it."""
+    from vedette.simulation.storage import check_target
+
+    with option_errors({"directory": "--out"}):
+        return () if out is None else check_target(out, overwrite)
+
+
+def unchanged_out(out: Path | None, overwrite: bool, identity: tuple[int, ...]) -> Path | None:
+    """Return the folder of `--out`, or a new one if another process has written there since it was checked."""
+    from vedette.simulation.storage import unchanged_target
+
+    folder = None if out is None else unchanged_target(out, overwrite, identity)
+    if folder != out:
+        note(f"--out: {out} has changed since this command started; it is kept, and the results go to {folder}")
+    return folder
+
+
+def save_unfinished(record: RunRecord, scenario: Scenario, fit: Fit | None, folder: Path, overwrite: bool) -> None:
+    """Write a run into the folder of `--out`, and mark it until `finishing`."""
+    from vedette.scenarios.dumping import dump_stored
+    from vedette.simulation.storage import save_run
+
+    text, found = dump_stored(scenario), None if fit is None else fit.to_dict()
+    with option_errors({"directory": "--out"}):
+        save_run(record, folder, scenario_text=text, fit=found, overwrite=overwrite, unfinished=True)
+
+
+@contextmanager
+def finishing(folder: Path, what: str) -> Iterator[None]:
+    """Remove the mark of an unfinished folder after the last of its files; Ctrl-C leaves it."""
+    from vedette.simulation.storage import UNFINISHED
+
+    with interruptible(f"wrote {folder}, but not all of its {what}; the same command starts anew"):
+        yield
+        (folder / UNFINISHED).unlink(missing_ok=True)
 
 
 class CodeTrust:
@@ -117,8 +156,6 @@ def run(
     """Run a scenario once: tracks, decisions with their rewards, errors, figures."""
     from vedette.evaluation.fit import fit_of_run
     from vedette.scenarios import load_scenario
-    from vedette.scenarios.dumping import dump_stored
-    from vedette.simulation.storage import check_target, save_run
 
     loaded = load_scenario(scenario)
     check_planner(loaded, planner, "--planner")
@@ -126,26 +163,26 @@ def run(
     warnings = print_warnings(loaded)
     if out is not None:
         require_packages("vedette run --out", "matplotlib", "pyarrow")
-        with option_errors({"directory": "--out"}):
-            check_target(out, overwrite)
+    identity = check_out(out, overwrite)
     with interruptible("nothing was written"):
         record, stop = _simulate(loaded, planner, seed, run_number, threads)
         fit = None if loaded.model.recording is None else fit_of_run(record, loaded)
         print_run(record, loaded, fit, len(warnings))
-        saved_to = out if stop is None or not _has_complete_run(out) else None
+        if stop is not None and _has_complete_run(out):
+            emit_json({**run_document(record, loaded, fit), "folder": None})
+            end_stopped(stop, f"{out} keeps the whole run that was there")
+        saved_to = unchanged_out(out, overwrite, identity)
         if saved_to is not None:
-            save_run(
-                record, saved_to, scenario_text=dump_stored(loaded), fit=fit and fit.to_dict(), overwrite=overwrite
-            )
+            save_unfinished(record, loaded, fit, saved_to, overwrite)
     emit_json({**run_document(record, loaded, fit), "folder": saved_to})
-    if stop is not None and saved_to is None:
-        end_stopped(stop, "nothing was written" if out is None else f"{out} keeps the whole run that was there")
-    if out is not None:
-        with interruptible(f"wrote {out}, but not all of its figures"):
-            _draw_run(record, loaded, out / "figures")
-        if stop is not None:
-            end_stopped(stop, f"wrote {out}, with the {pluralise(record.num_scans, 'scan')} before")
-        echo(f"wrote {out}")
+    if saved_to is not None:
+        with finishing(saved_to, "figures"):
+            _draw_run(record, loaded, saved_to / "figures")
+    if stop is not None:
+        scans = pluralise(record.num_scans, "scan")
+        end_stopped(stop, "nothing was written" if saved_to is None else f"wrote {saved_to}, with the {scans} before")
+    if saved_to is not None:
+        echo(f"wrote {saved_to}")
 
 
 def _simulate(

@@ -11,17 +11,24 @@ import typer
 from vedette.cli.compiling import compiling
 from vedette.cli.completing import one_of
 from vedette.cli.documents import run_document
-from vedette.cli.errors import option_errors, usage_error
+from vedette.cli.errors import usage_error
 from vedette.cli.options import BAD_ROWS, BadRows, Overwrite, ScansFile, SensorsFile, Speed, Trust
 from vedette.cli.output import bar, echo, emit_json, note
 from vedette.cli.run_summary import print_run
-from vedette.cli.running import CodeTrust, end_stopped, interruptible
+from vedette.cli.running import (
+    CodeTrust,
+    check_out,
+    end_stopped,
+    finishing,
+    interruptible,
+    save_unfinished,
+    unchanged_out,
+)
 from vedette.cli.scenario_files import note_assumptions, print_warnings
 from vedette.internal.extras import without
 from vedette.internal.text import pluralise
 
 if TYPE_CHECKING:
-    from vedette.evaluation.fit import Fit
     from vedette.evaluation.joining import Join
     from vedette.recorded import RecordedScans
     from vedette.scenarios import Scenario
@@ -74,7 +81,7 @@ def track(
     """
     from vedette.evaluation.fit import fit_of_run
 
-    _check_output(formats or (), out, overwrite)
+    identity = _check_output(formats or (), out, overwrite)
     recorded, warnings = read_recording(sensors, scans, truth, speed=speed, bad_rows=bad_rows, trust=trust)
     scenario, recording, assumed = recorded
     if "clutter" in assumed:
@@ -85,22 +92,29 @@ def track(
     written: list[Path] = []
     with interruptible("nothing was written"):
         record = _run_tracker(scenario, recording)
-        fit = fit_of_run(record, scenario)
+        with compiling():
+            fit = fit_of_run(record, scenario)
         print_run(record, scenario, fit, len(warnings))
+        folder = unchanged_out(out, overwrite, identity)
+        if folder is not None:
+            if missing_package := without("vedette track --out: a folder of results", "pyarrow"):
+                note(f"{missing_package}; the tracks are written without it")
+            else:
+                save_unfinished(record, scenario, fit, folder, overwrite)
+    with interruptible("nothing was written") if folder is None else finishing(folder, "tracks and figures"):
         joins = _print_tracks(record, recorded, scans, join)
-        if out is not None:
-            written = _save(record, scenario, fit, out, formats, joins, overwrite=overwrite)
-    if out is not None:
-        _draw(record, scenario, out)
-        echo(f"Wrote {out}: {', '.join(_contents(out, written))}")
+        if folder is not None:
+            written = _write_tracks(record, scenario, folder, formats, joins)
+            _draw(record, scenario, folder)
+    if folder is not None:
+        echo(f"Wrote {folder}: {', '.join(_contents(folder, written))}")
     origin = {"assumptions": assumed, "skipped": recording.skipped, "warnings": warnings}
     joined = [join._asdict() for join in joins]
-    emit_json({**run_document(record, scenario, fit), **origin, "joins": joined, "folder": out, "written": written})
+    emit_json({**run_document(record, scenario, fit), **origin, "joins": joined, "folder": folder, "written": written})
 
 
-def _check_output(formats: Sequence[str], out: Path | None, overwrite: bool) -> None:
+def _check_output(formats: Sequence[str], out: Path | None, overwrite: bool) -> tuple[int, ...]:
     from vedette.evaluation.track_table import check_format
-    from vedette.simulation.storage import check_target
 
     for name in formats:
         if name not in FORMATS:
@@ -108,9 +122,7 @@ def _check_output(formats: Sequence[str], out: Path | None, overwrite: bool) -> 
         check_format(Path(f"tracks.{name}"))
     if formats and out is None:
         raise usage_error("expected with --out, which names the folder", "--format")
-    if out is not None:
-        with option_errors({"directory": "--out"}):
-            check_target(out, overwrite)
+    return check_out(out, overwrite)
 
 
 def _run_tracker(scenario: Scenario, recording: RecordedScans) -> RunRecord:
@@ -125,27 +137,14 @@ def _run_tracker(scenario: Scenario, recording: RecordedScans) -> RunRecord:
         end_stopped(error, "nothing was written")
 
 
-def _save(
-    record: RunRecord,
-    scenario: Scenario,
-    fit: Fit,
-    out: Path,
-    formats: Sequence[str] | None,
-    joins: Sequence[Join],
-    *,
-    overwrite: bool,
+def _write_tracks(
+    record: RunRecord, scenario: Scenario, folder: Path, formats: Sequence[str] | None, joins: Sequence[Join]
 ) -> list[Path]:
-    """Write the results folder and the tracks; return the files of tracks."""
+    """Write the tracks in each format; return their files."""
     from vedette.evaluation.track_table import table_of_run, write_tracks
-    from vedette.scenarios.dumping import dump_stored
-    from vedette.simulation.storage import save_run
 
-    if missing_package := without("vedette track --out: a folder of results", "pyarrow"):
-        note(f"{missing_package}; the tracks are written without it")
-    else:
-        save_run(record, out, scenario_text=dump_stored(scenario), fit=fit.to_dict(), overwrite=overwrite)
     default_formats = ("csv", "geojson") if scenario.model.origin is not None else ("csv",)
-    written = [out / "tracks" / f"tracks.{name}" for name in dict.fromkeys(formats or default_formats)]
+    written = [folder / "tracks" / f"tracks.{name}" for name in dict.fromkeys(formats or default_formats)]
     table = table_of_run(record, scenario, joins)
     for path in written:
         write_tracks(path, table)
@@ -186,7 +185,10 @@ def _print_tracks(record: RunRecord, recorded: RecordingScenario, scans: Path, j
     scenario, recording, _ = recorded
     sizes = pluralise(record.num_scans, "scan"), pluralise(recording.num_measurements, "measurement")
     echo(f"{scans}: {', '.join(sizes)}, {pluralise(len(scenario.model.sensors), 'sensor')}")
-    joins = joins_of_run(record, scenario) if join else ()
+    joins: tuple[Join, ...] = ()
+    if join:
+        with compiling(), bar("joins of tracks, scans", record.num_scans) as progress:
+            joins = joins_of_run(record, scenario, progress=progress)
     echo(f"  tracks      {_describe_tracks(with_joined_tracks(record, joins))}")
     if joins:
         echo(f"  joined      {pluralise(len(joins), 'gap')} between labels of one track (--no-join: none)")
@@ -212,5 +214,4 @@ def _draw(record: RunRecord, scenario: Scenario, out: Path) -> None:
         return
     from vedette.evaluation.figures import build_scene, save_figure, tracks_figure
 
-    with interruptible(f"wrote {out}, but not all of its figures"):
-        save_figure(tracks_figure(record, scene=build_scene(scenario, record.planner)), out / "figures" / "tracks")
+    save_figure(tracks_figure(record, scene=build_scene(scenario, record.planner)), out / "figures" / "tracks")

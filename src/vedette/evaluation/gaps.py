@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
 
-from vedette.densities import TrackHistory
+from vedette.densities import FactoredGLMB, TrackHistory
 from vedette.evaluation.observation_history import (
     ObservationHistory,
     birth_count_ratio,
@@ -27,6 +27,8 @@ _LEAST_INFORMATION = 1e-6
 _MOST_CERTAIN = 1.0 - 1e-12
 # Scans after which an ended label is no candidate.
 _LONGEST_GAP = 200
+# A smaller ratio changes no sum of ratios that contains one above 1, in double precision.
+LEAST_LOG_RATIO = -60.0
 
 
 class _Information(NamedTuple):
@@ -45,25 +47,30 @@ class _EndedLabels:
     Log weights are of the probability that the target existed at the last estimate and has survived until now.
     """
 
-    tracks: list[int]
+    tracks: Ints  # (num,) indices of their histories
     num_scans: Floats  # (num,) since the last estimate
     mixture: Mixture
     log_missed: Floats  # (num,) log probability that all scans since have missed it at its predicted place
     detected: Floats  # (num,) probability that a scan since would have detected it
+
+    @classmethod
+    def none(cls, dim: int) -> _EndedLabels:
+        empty = components_of(np.empty(0), np.empty((0, dim)), np.empty((0, dim, dim)))
+        return cls(np.empty(0, np.int64), np.empty(0), empty, np.empty(0), np.empty(0))
 
     def add(self, track: int, history: TrackHistory) -> None:
         with np.errstate(divide="ignore"):
             weight = np.log(history.existence[-1:])
         new = components_of(weight, history.means[-1:].copy(), history.covs[-1:].copy())
         self.mixture = joined_components([self.mixture, new])
-        self.tracks.append(track)
+        self.tracks = np.append(self.tracks, track)
         self.num_scans, self.log_missed, self.detected = (
             np.append(values, 0.0) for values in (self.num_scans, self.log_missed, self.detected)
         )
 
     def keep(self, places: Ints) -> None:
         """Keep only the labels at the indices `places`."""
-        self.tracks = [self.tracks[place] for place in places.tolist()]
+        self.tracks = self.tracks[places]
         self.mixture = taken_components(self.mixture, places)
         self.num_scans = self.num_scans[places]
         self.log_missed, self.detected = self.log_missed[places], self.detected[places]
@@ -91,8 +98,25 @@ class _EndedLabels:
         return np.asarray(np.log1p(-(1.0 - prob_hidden) * np.minimum(self.detected, _MOST_CERTAIN)))
 
 
-def gap_log_ratios(histories: Sequence[TrackHistory], observations: ObservationHistory) -> Floats:
-    """Return, for each pair of labels, the log likelihood ratio of one target with a gap against all alternatives.
+class GapRatios(NamedTuple):
+    """Log likelihood ratios of pairs of labels, in increasing order of the indices of their histories.
+
+    Left out are pairs that cannot be one target, and pairs of a ratio below `LEAST_LOG_RATIO`, on which the probability
+    of no other join depends.
+    """
+
+    ended: Ints  # (num_pairs,) index of the label that continues
+    began: Ints  # (num_pairs,)
+    log_ratios: Floats  # (num_pairs,)
+
+
+def gap_log_ratios(
+    histories: Sequence[TrackHistory],
+    observations: ObservationHistory,
+    *,
+    progress: Callable[[int], object] = lambda scan: None,
+) -> GapRatios:
+    """Return, for pairs of labels, the log likelihood ratio of one target with a gap against all alternatives.
 
     Label i ended with existence r and density N(m, P) at its last estimate; the first of label j is n scans later. With
     P_S(n) the probability of surviving until then, U = h / n + (1 - h) * product of 1 - P_D over the scans between (h
@@ -114,55 +138,75 @@ def gap_log_ratios(histories: Sequence[TrackHistory], observations: ObservationH
     Args:
         histories: of all labels, see `track_histories`.
         observations: models, times and poses.
-
-    Returns:
-        (num_labels, num_labels) log ratio of the row's label continuing as the column's; -inf if it cannot.
+        progress: called with the number of every finished scan.
     """
-    num, dim = len(histories), observations.targets.state_dim
-    ratios = np.full((num, num), -np.inf)
-    first_scans, birth_ratio = (
-        [int(history.steps[0]) - 1 for history in histories],
-        birth_count_ratio(histories, observations),
-    )
-    compared = [history.steps[:_FIRST_ESTIMATES] - 1 for history in histories]
-    empty = components_of(np.empty(0), np.empty((0, dim)), np.empty((0, dim, dim)))
-    ended = _EndedLabels([], np.empty(0), empty, np.empty(0), np.empty(0))
-    pending: dict[int, dict[int, float]] = {}  # log ratios without G, by the columns' and rows' labels
+    first_scans = [int(history.steps[0]) - 1 for history in histories]
+    birth_ratio = birth_count_ratio(histories, observations)
+    starts, ends = _by_scan(first_scans), _by_scan(int(history.steps[-1]) - 1 for history in histories)
+    compared = _by_scan(int(history.steps[:_FIRST_ESTIMATES][-1]) - 1 for history in histories)
+    ended = _EndedLabels.none(observations.targets.state_dim)
+    pending: dict[int, tuple[Ints, Floats]] = {}  # ended labels and log ratios without G, by the label that began
+    pairs = [GapRatios(np.empty(0, np.int64), np.empty(0, np.int64), np.empty(0))]
     for scan, undetected in enumerate(undetected_priors(observations, first_scans)):
-        if ended.tracks:
+        if len(ended.tracks):
             ended.mixture = observations.predict(ended.mixture, scan - 1, scan)
             ended.num_scans += 1.0
-        for j in [j for j, first_scan in enumerate(first_scans) if first_scan == scan and ended.tracks]:
-            prior = birth_intensity(undetected, histories[j], observations)
-            if not (prior.log_weights > -np.inf).any():
-                continue  # the models exclude births then and do not explain how the label began
-            information = list(_estimate_information(histories[j], prior, observations))
-            continuing = ended.mixture._replace(
-                log_weights=ended.mixture.log_weights + ended.log_undetected(observations.prob_hidden)
-            )
-            continued, born = (_log_fits(mixture, scan, information, observations) for mixture in (continuing, prior))
-            alternatives = birth_ratio - 1.0 + 1.0 / histories[j].existence[:_FIRST_ESTIMATES][-1]
-            log_ratios = continued - np.logaddexp.reduce(born) - np.log(alternatives)
-            pending[j] = dict(zip(ended.tracks, log_ratios, strict=True))
-        if ended.tracks:
+            for j in starts.get(scan, ()):
+                log_ratios = _log_ratios(histories[j], ended, scan, undetected, observations, birth_ratio)
+                pending[j] = ended.tracks, log_ratios
             ended.update_missed(observations, scan)
-        log_undetected = dict(zip(ended.tracks, ended.log_never_detected(observations.prob_hidden), strict=True))
-        for j in [j for j in pending if compared[j][-1] == scan]:
-            for i, log_ratio in pending.pop(j).items():
-                ratios[i, j] = log_ratio - log_undetected[i] if i in log_undetected else -np.inf
-        ended.keep(np.flatnonzero([scan - histories[i].steps[-1] < _LONGEST_GAP for i in ended.tracks]))
-        for i in [i for i, history in enumerate(histories) if history.steps[-1] - 1 == scan]:
+        log_undetected = ended.log_never_detected(observations.prob_hidden)
+        for j in [j for j in compared.get(scan, ()) if j in pending]:
+            tracks, log_ratios = pending.pop(j)
+            still_ended, places, present = np.intersect1d(tracks, ended.tracks, return_indices=True)
+            log_ratios = log_ratios[places] - log_undetected[present]
+            likely = log_ratios > -np.inf
+            pairs.append(GapRatios(still_ended[likely], np.full(likely.sum(), j), log_ratios[likely]))
+        ended.keep(np.flatnonzero(ended.num_scans <= _LONGEST_GAP))
+        for i in ends.get(scan, ()):
             ended.add(i, histories[i])
-    return ratios + _log_class_ratios(histories, observations.targets.birth)
+        progress(scan + 1)
+    return _likely_pairs(pairs, histories, observations.targets.birth)
 
 
-def _log_class_ratios(histories: Sequence[TrackHistory], birth: BirthModel) -> Floats:
-    """Return the log of the factor of the classes in the ratio of each pair of labels, (num_labels, num_labels)."""
-    if birth.class_probs is None or not histories:
-        return np.zeros((len(histories), len(histories)))
-    probs = np.stack([history.class_probs[-1] for history in histories])
-    with np.errstate(divide="ignore"):
-        return np.asarray(np.log(probs @ (probs / birth.class_probs).T))
+def _by_scan(scans: Iterable[int]) -> dict[int, list[int]]:
+    """Return the indices of the labels of each scan."""
+    groups: dict[int, list[int]] = {}
+    for index, scan in enumerate(scans):
+        groups.setdefault(scan, []).append(index)
+    return groups
+
+
+def _log_ratios(
+    began: TrackHistory,
+    ended: _EndedLabels,
+    scan: int,
+    undetected: FactoredGLMB,
+    observations: ObservationHistory,
+    birth_ratio: float,
+) -> Floats:
+    """Return the log ratios without G and classes of a label that began at a scan, for each ended label, (num,)."""
+    prior = birth_intensity(undetected, began, observations)
+    if not (prior.log_weights > -np.inf).any():
+        return np.full(len(ended.tracks), -np.inf)  # the models exclude births and do not explain how the label began
+    information = list(_estimate_information(began, prior, observations))
+    log_undetected = ended.log_undetected(observations.prob_hidden)
+    continuing = ended.mixture._replace(log_weights=ended.mixture.log_weights + log_undetected)
+    continued, born = (_log_fits(mixture, scan, information, observations) for mixture in (continuing, prior))
+    alternatives = birth_ratio - 1.0 + 1.0 / began.existence[:_FIRST_ESTIMATES][-1]
+    return np.asarray(continued - np.logaddexp.reduce(born) - np.log(alternatives))
+
+
+def _likely_pairs(pairs: Sequence[GapRatios], histories: Sequence[TrackHistory], birth: BirthModel) -> GapRatios:
+    """Return the pairs of a ratio, with the factor of the classes, that joins depend on, in order."""
+    ended, began, log_ratios = (np.concatenate(columns) for columns in zip(*pairs, strict=True))
+    if birth.class_probs is not None and histories:
+        probs = np.stack([history.class_probs[-1] for history in histories])
+        with np.errstate(divide="ignore"):
+            log_ratios = log_ratios + np.log((probs[ended] * (probs / birth.class_probs)[began]).sum(axis=1))
+    order = np.lexsort((began, ended))
+    order = order[log_ratios[order] >= LEAST_LOG_RATIO]
+    return GapRatios(ended[order], began[order], log_ratios[order])
 
 
 def _estimate_information(

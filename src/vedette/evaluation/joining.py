@@ -2,18 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
 
 from vedette.densities import Estimate, track_histories
-from vedette.evaluation.gaps import gap_log_ratios
+from vedette.evaluation.gaps import GapRatios, gap_log_ratios
 from vedette.evaluation.observation_history import ObservationHistory
 from vedette.evaluation.scans import scans_of_record
 from vedette.filters import common_target_model, has_labels
-from vedette.kernels.base.types import Floats
+from vedette.kernels.base.types import Floats, Ints
 from vedette.models.arguments import probability
 from vedette.scenarios import Scenario
 from vedette.scenarios.build import build_sensors
@@ -33,14 +33,20 @@ class Join(NamedTuple):
 
 
 def joins_of_run(
-    record: RunRecord, scenario: Scenario, *, prob_hidden: float = PROB_HIDDEN, threshold: float = THRESHOLD
+    record: RunRecord,
+    scenario: Scenario,
+    *,
+    prob_hidden: float = PROB_HIDDEN,
+    threshold: float = THRESHOLD,
+    progress: Callable[[int], object] = lambda scan: None,
 ) -> tuple[Join, ...]:
     """Return the joins of a run's labels by the models of its scenario, in the order of `began`.
 
     There are none for filters whose targets have no labels.
 
-    prob_hidden: see `ObservationHistory`. threshold: the lowest probability of a join. Raises `InputError` for numbers
-    that are not probabilities, and `VedetteError` for models or a recording that cannot be built.
+    prob_hidden: see `ObservationHistory`. threshold: the lowest probability of a join. progress: called with the
+    number of every finished scan. Raises `InputError` for numbers that are not probabilities, and `VedetteError` for
+    models or a recording that cannot be built.
     """
     filters = tuple(sensor.filter for sensor in build_sensors(scenario))
     if not all(map(has_labels, filters)):
@@ -50,11 +56,15 @@ def joins_of_run(
     observations = ObservationHistory(
         common_target_model(filters), sensors, record.times, record.poses, scanned, prob_hidden
     )
-    return find_joins(record.estimates, observations, threshold=threshold)
+    return find_joins(record.estimates, observations, threshold=threshold, progress=progress)
 
 
 def find_joins(
-    estimates: Sequence[Estimate], observations: ObservationHistory, *, threshold: float = THRESHOLD
+    estimates: Sequence[Estimate],
+    observations: ObservationHistory,
+    *,
+    threshold: float = THRESHOLD,
+    progress: Callable[[int], object] = lambda scan: None,
 ) -> tuple[Join, ...]:
     """Return the joins like `joins_of_run`, for estimates of successive scans.
 
@@ -62,36 +72,47 @@ def find_joins(
     """
     probability("threshold", threshold)
     histories = track_histories(estimates, observations.times)
-    log_ratios = gap_log_ratios(histories, observations)
-    probabilities = _join_probabilities(log_ratios)
+    pairs = gap_log_ratios(histories, observations, progress=progress)
+    probabilities = _join_probabilities(pairs, len(histories))
     joins = [
-        Join(histories[i].label, histories[j].label, float(probabilities[i, j]))
-        for i, j in zip(*_best_joins(log_ratios), strict=True)
-        if probabilities[i, j] >= threshold and log_ratios[i, j] > -np.inf
+        Join(histories[pairs.ended[k]].label, histories[pairs.began[k]].label, float(probabilities[k]))
+        for k in _best_joins(pairs).tolist()
+        if probabilities[k] >= threshold
     ]
     return tuple(sorted(joins, key=lambda join: join.began))
 
 
-def _join_probabilities(log_ratios: Floats) -> Floats:
-    """Return the probability of each join among those of either of its labels, and none, shape (num, num).
+def _join_probabilities(pairs: GapRatios, num_labels: int) -> Floats:
+    """Return the probability of each pair's join among those of either of its labels, and none, shape (num_pairs,).
 
     Exact if one of the two has no other; else a little low, as a rival may itself be joined elsewhere.
     """
-    rows, columns = (np.logaddexp.reduce(log_ratios, axis=axis, initial=-np.inf) for axis in (1, 0))
-    others = np.logaddexp(rows[:, np.newaxis], columns)
-    with np.errstate(invalid="ignore"):
-        probabilities = np.where(log_ratios > -np.inf, np.exp(log_ratios - others), 0.0)
+    ended, began, log_ratios = pairs
+    rows, columns = np.full(num_labels, -np.inf), np.full(num_labels, -np.inf)
+    np.logaddexp.at(rows, ended, log_ratios)
+    np.logaddexp.at(columns, began, log_ratios)
+    others = np.logaddexp(rows[ended], columns[began])
+    probabilities = np.exp(log_ratios - others)
     return np.asarray(np.exp(log_ratios - np.logaddexp(0.0, others + np.log1p(-np.minimum(probabilities, 0.5)))))
 
 
-def _best_joins(log_ratios: Floats) -> tuple[list[int], list[int]]:
-    """Return rows and columns of the joins with the largest summed log ratio, each row and column at most once."""
-    from scipy.optimize import linear_sum_assignment
+def _best_joins(pairs: GapRatios) -> Ints:
+    """Return the indices of the pairs with the largest summed log ratio, each label at most once in either role."""
+    from scipy.sparse import coo_array
+    from scipy.sparse.csgraph import min_weight_full_bipartite_matching
 
-    gains = np.maximum(log_ratios, 0.0)
-    rows, columns = linear_sum_assignment(gains, maximize=True)
-    chosen = gains[rows, columns] > 0.0
-    return rows[chosen].tolist(), columns[chosen].tolist()
+    gains = np.flatnonzero(pairs.log_ratios > 0.0)
+    ended, rows = np.unique(pairs.ended[gains], return_inverse=True)
+    began, columns = np.unique(pairs.began[gains], return_inverse=True)
+    # A column of its own for each row, without a gain; 1 is added to all weights, as an edge of weight 0 is none.
+    own = np.arange(len(ended))
+    weights = np.concatenate([pairs.log_ratios[gains], np.zeros(len(own))]) + 1.0
+    places = np.concatenate([rows, own]), np.concatenate([columns, len(began) + own])
+    if not len(gains):
+        return gains
+    graph = coo_array((weights, places), shape=(len(own), len(began) + len(own))).tocsr()
+    matched = min_weight_full_bipartite_matching(graph, maximize=True)[1]
+    return np.asarray(gains[matched[rows] == columns])
 
 
 def track_names(joins: Sequence[Join]) -> dict[Label, Label]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from bisect import bisect_left
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
@@ -97,10 +98,11 @@ def undetected_priors(observations: ObservationHistory, first_scans: Sequence[in
     """
     filters = [FactoredGlmbFilter(observations.targets, sensor) for sensor in observations.sensors]
     belief, rng = filters[0].initial(), np.random.default_rng(0)
+    ordered = sorted(first_scan for first_scan in first_scans if first_scan > 0)
     for scan in range(len(observations.times)):
         undetected = belief.undetected
         if undetected is not None and undetected.birth_rate is not None:
-            number = float(sum(0 < first_scan < scan for first_scan in first_scans))
+            number = float(bisect_left(ordered, scan))
             learnt = replace(undetected.birth_rate, past=number)
             belief = belief.with_fields(undetected=replace(undetected, birth_rate=learnt))
         belief, _ = filters[0].predict(belief, observations.scan_interval(scan), scan + 1)

@@ -86,32 +86,36 @@ def _long_tracks(record: RunRecord, scenario: Scenario, scans: Scans, placed: li
     sensors, stds = scenario.model.sensors, noise_stds(scenario, placed)
     tracks: dict[Label, _Track] = {}
     for k, estimate in enumerate(record.estimates):
-        for label, mean, cov in zip(map(tuple, estimate.labels.tolist()), estimate.means, estimate.covs, strict=True):
-            track = tracks.setdefault(label, _Track({}, tuple([] for _ in sensors)))
-            track.means[k] = mean[:2]
-            for s in placed:
-                scan, pose = scans[k][s], record.poses[k, s]
-                if scan is None or not _in_view(sensors[s], pose, mean):
-                    continue
-                kind = sensors[s].measurement.kind
-                gated = in_gate(scan.measurements, kind, stds[s], pose, mean[:2], cov[:2, :2])
-                track.detections[s].append(bool(gated.any()))
+        of_scan, means = [], estimate.means[:, :2]
+        for (step, index), mean in zip(estimate.labels.tolist(), means, strict=True):
+            of_scan.append(tracks.setdefault((step, index), _Track({}, tuple([] for _ in sensors))))
+            of_scan[-1].means[k] = mean
+        for s in placed:
+            scan, pose, kind = scans[k][s], record.poses[k, s], sensors[s].measurement.kind
+            if scan is None:
+                continue
+            gated = in_gate(scan.measurements, kind, stds[s], pose, means, estimate.covs[:, :2, :2])
+            for track, mean, of_track in zip(of_scan, means, gated, strict=True):
+                if _in_view(sensors[s], pose, mean):
+                    track.detections[s].append(bool(of_track.any()))
     return {label: track for label, track in tracks.items() if len(track.means) >= _MIN_ESTIMATES}
 
 
-def in_gate(scan: Floats, kind: str, stds: Floats, pose: Floats, mean: Floats, cov: Floats) -> Bools:
-    """Return True for each measurement of a scan within the gate of an estimate, by its place, shape (num,)."""
+def in_gate(scan: Floats, kind: str, stds: Floats, pose: Floats, means: Floats, covs: Floats) -> Bools:
+    """Return True for each estimate and measurement of a scan within its gate, by its place, (num_estimates, num)."""
     if kind == "position":
-        residuals, jacobian = scan - mean, np.eye(2)
+        residuals = scan - means[:, np.newaxis]
     else:
-        offset = mean - pose[:2]
-        distance = max(float(np.hypot(*offset)), 1.0)
-        direction = offset / distance
-        jacobian = np.array([[-direction[1] / distance, direction[0] / distance], direction])
-        residuals = scan[:, :2] - [math.atan2(offset[1], offset[0]), distance]
-        residuals[:, 0] = np.remainder(residuals[:, 0] + math.pi, 2.0 * math.pi) - math.pi
-    covariance = jacobian @ cov @ jacobian.T + np.diag(stds**2)
-    return np.asarray(np.einsum("ni,ij,nj->n", residuals, np.linalg.inv(covariance), residuals) <= _GATE**2)
+        offsets = means - pose[:2]
+        distances = np.maximum(np.hypot(offsets[:, 0], offsets[:, 1]), 1.0)[:, np.newaxis]
+        directions = offsets / distances
+        jacobians = np.stack([directions[:, ::-1] * [-1.0, 1.0] / distances, directions], axis=1)
+        expected = np.column_stack([np.arctan2(offsets[:, 1], offsets[:, 0]), distances])
+        residuals = scan[:, :2] - expected[:, np.newaxis]
+        residuals[..., 0] = np.remainder(residuals[..., 0] + math.pi, 2.0 * math.pi) - math.pi
+        covs = jacobians @ covs @ jacobians.transpose(0, 2, 1)
+    precisions = np.linalg.inv(covs + np.diag(stds**2))
+    return np.asarray(np.einsum("nmi,nij,nmj->nm", residuals, precisions, residuals) <= _GATE**2)
 
 
 def noise_stds(scenario: Scenario, placed: list[int]) -> dict[int, Floats]:

@@ -88,9 +88,8 @@ def _unexplained_scans(record: RunRecord, scenario: Scenario, placed: list[int])
             scan, pose, kind = scans[s], record.poses[k, s], sensors[s].measurement.kind
             if scan is None:
                 continue
-            explained = np.zeros(len(scan.measurements), np.bool_)
-            for mean, cov in zip(estimate.means, estimate.covs, strict=True):
-                explained |= in_gate(scan.measurements, kind, stds[s], pose, mean[:2], cov[:2, :2])
+            places = estimate.means[:, :2], estimate.covs[:, :2, :2]
+            explained = in_gate(scan.measurements, kind, stds[s], pose, *places).any(axis=0)
             measurements = scan.measurements[~explained]
             place_stds = np.full(len(measurements), stds[s].max())
             if PLANE_SHAPES[kind] == "point":

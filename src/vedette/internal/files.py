@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import errno
 import os
+import re
 import sqlite3
 import uuid
 from collections.abc import Callable
@@ -13,6 +14,8 @@ from typing import BinaryIO
 
 from vedette.errors import InputError
 from vedette.internal.text import printable
+
+_TEMPORARY = re.compile(r"\.(.+)\.[0-9a-f]{32}")  # next to a file until it is whole
 
 
 def write_whole(target: Path, write: Callable[[BinaryIO], object]) -> None:
@@ -46,6 +49,14 @@ def write_file(target: Path, write: Callable[[BinaryIO], object], *, make_folder
         raise InputError(f"{target}: expected a file that can be written; {error.strerror or error}") from error
 
 
+def sweep(folder: Path, name: str = "") -> None:
+    """Delete what killed processes have left of `write_whole`, for files of this name or all; only under a lock."""
+    if folder.is_dir():
+        for path in folder.iterdir():
+            if (found := _TEMPORARY.fullmatch(path.name)) and name in ("", found[1]):
+                path.unlink(missing_ok=True)
+
+
 def unwritable(target: Path) -> str:
     """Return the reason why no file can be written at `target`; empty if its nearest existing folder is writable."""
     around = next(folder for folder in target.absolute().parents if folder.exists())
@@ -67,12 +78,14 @@ def sync_folder(folder: Path) -> None:
 def lock_beside(path: Path) -> sqlite3.Connection:
     """Return a lock that lets a single process write a file: an open transaction on `PATH.lock`.
 
-    The lock ends with the process. Raises `InputError` if another process holds it, or the folder cannot be written.
+    What a killed process has left of the file is deleted. The lock ends with the process. Raises `InputError`
+    if another process holds it, or the folder cannot be written.
     """
     busy = f"{path}: expected to write alone; another process is writing it"
-    return locked(
-        path.with_name(f"{path.name}.lock"), busy, f"{path}: expected a file in a folder that can be written;"
-    )
+    failed = f"{path}: expected a file in a folder that can be written;"
+    lock = locked(path.with_name(f"{path.name}.lock"), busy, failed)
+    sweep(path.parent, path.name)
+    return lock
 
 
 def locked(path: Path, busy: str, failed: str) -> sqlite3.Connection:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import multiprocessing
 import os
 import signal
@@ -10,6 +11,7 @@ import threading
 from collections.abc import Iterator
 from concurrent.futures import ProcessPoolExecutor
 from contextlib import contextmanager
+from multiprocessing import resource_tracker
 from multiprocessing.context import BaseContext
 from pathlib import Path
 from typing import Any
@@ -59,29 +61,43 @@ def load_ahead(*more: str) -> None:
 def as_children(*, of_server: bool = False) -> Iterator[None]:
     """Context manager: processes started inside ignore Ctrl-C, and their linear algebra uses one thread.
 
-    The main process stops them.
+    The main process stops them. Ctrl-C inside is deferred to the end.
 
     Args:
         of_server: the processes belong to `context` and start after `load_ahead`. If there is a fork server, it already
-            ignores Ctrl-C. As it may take a second to load, Ctrl-C is then deferred instead of lost.
+            ignores Ctrl-C.
     """
     ours = {name: "1" for name in _THREADS if name not in os.environ}
-    in_main = threading.current_thread() is threading.main_thread()
     before = signal.getsignal(signal.SIGINT)
+    defers = threading.current_thread() is threading.main_thread() and callable(before)
     came: list[tuple[Any, ...]] = []
-    waits = of_server and _METHOD == "forkserver" and callable(before)
-    if in_main:
-        signal.signal(signal.SIGINT, (lambda *of: came.append(of)) if waits else signal.SIG_IGN)
+    if defers:
+        signal.signal(signal.SIGINT, lambda *of: came.append(of))
     os.environ.update(ours)
     try:
-        yield
+        with contextlib.nullcontext() if of_server and _METHOD == "forkserver" else _interrupts_blocked():
+            yield
     finally:
         for name in ours:
             os.environ.pop(name, None)
-        if in_main:
+        if defers:
             signal.signal(signal.SIGINT, before)
         if came and callable(before):
             before(*came[-1])
+
+
+@contextmanager
+def _interrupts_blocked() -> Iterator[None]:
+    """Block Ctrl-C in this thread: new processes inherit this, while this one receives the signal afterwards."""
+    if not hasattr(signal, "pthread_sigmask"):  # Windows
+        yield
+        return
+    resource_tracker.ensure_running()  # its start, which would be inside, unblocks Ctrl-C
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
 def let_go_of_results(pool: ProcessPoolExecutor) -> None:

@@ -41,22 +41,24 @@ class LineSplitter:
 
 async def iter_lines(source: Any) -> AsyncIterator[bytes]:
     """Yield the lines of a binary file such as standard input, which is read ahead by one chunk."""
-    loop, chunks = asyncio.get_running_loop(), asyncio.Queue[bytes](1)
+    loop, chunks, room = asyncio.get_running_loop(), asyncio.Queue[bytes](), threading.Semaphore(1)
     try:  # a buffered file would stay locked while it waits for data, even at the end of the process
         number = source.fileno()
     except OSError:
         number = None
 
     def read() -> None:
-        with contextlib.suppress(RuntimeError, asyncio.CancelledError):  # the loop has ended
+        with contextlib.suppress(RuntimeError):  # the loop has ended
             data = b"-"
             while data:
                 data = source.read(CHUNK) if number is None else os.read(number, CHUNK)
-                asyncio.run_coroutine_threadsafe(chunks.put(data), loop).result()
+                room.acquire()
+                loop.call_soon_threadsafe(chunks.put_nowait, data)
 
     threading.Thread(target=read, daemon=True).start()
     splitter = LineSplitter(MAX_LINE_BYTES)
     while data := await chunks.get():
+        room.release()
         for line in splitter.feed(data):
             yield line
     for line in splitter.rest():

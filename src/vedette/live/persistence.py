@@ -113,7 +113,8 @@ class PersistentLoop:
         """Save the state if it changed, and close the record."""
         self.save()
         if self._record is not None:
-            self._record.close()
+            with contextlib.suppress(OSError):  # of a full disk, which `process` has reported
+                self._record.close()
         self._locks.close()
 
 

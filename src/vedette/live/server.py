@@ -26,6 +26,7 @@ MAX_CLIENTS_PER_ADDRESS = 64  # clients per address
 MAX_WAITING = 32  # further connections that have not entered
 BACKLOG = 16  # connections accepted before any of them is counted
 IDLE_SECONDS = 60.0  # silence after which a client may be disconnected to make room
+FIRST_LINE_SECONDS = 10.0  # the same for a client that has not sent a valid line
 WRONG_TOKEN_DELAY = 1.0  # delay of the answer to a wrong token
 MIN_TOKEN_LENGTH = 16  # letters
 MAX_UNREAD_BYTES = 8_000_000  # bytes of answers that a client has not read
@@ -88,7 +89,8 @@ class LineServer:
     A client that sends faster than lines are processed waits, by the flow control of TCP, while other clients are
     served; no queue builds up. A client that does not read its answers is disconnected. A client enters after its token
     or its handshake. If more than `MAX_WAITING` have not entered, the first client of the address with the most of
-    them is disconnected. If there is no room, a client that was silent for `IDLE_SECONDS` is disconnected.
+    them is disconnected. If there is no room, a client that was silent for `IDLE_SECONDS`, or has not sent a valid line
+    within `FIRST_LINE_SECONDS`, is disconnected.
 
     Args:
         process: function that processes a line and returns its answers.
@@ -102,7 +104,8 @@ class LineServer:
         self._process, self._token, self.report = process, token, report
         self.remark = Remarks(report)
         self._waiting: dict[Client, None] = {}  # in order of arrival
-        self._entered: dict[Client, float] = {}  # time of each client's last line; inf for pages
+        self._entered: dict[Client, float] = {}  # time of each client's last valid line; inf for pages
+        self._senders = set[Client]()  # clients that have sent a valid line
         self.num_processed = 0
         self.changed = asyncio.Event()
 
@@ -146,7 +149,8 @@ class LineServer:
         silent = [
             (since, entered)
             for entered, since in self._entered.items()
-            if now - since >= IDLE_SECONDS and address in (None, entered.address)
+            if now - since >= (IDLE_SECONDS if entered in self._senders else FIRST_LINE_SECONDS)
+            and address in (None, entered.address)
         ]
         if not silent:
             return False
@@ -160,6 +164,7 @@ class LineServer:
         """Remove a connection that has ended."""
         self._waiting.pop(client, None)
         self._entered.pop(client, None)
+        self._senders.discard(client)
 
     async def refuse_token(self, client: Client) -> None:
         """Make a remark on a wrong token, and delay the answer."""
@@ -170,9 +175,11 @@ class LineServer:
 
     async def answer(self, line: bytes, sender: Client | None) -> None:
         """Process a line, send its answers, and let other clients be served."""
-        if sender in self._entered:
+        answers = list(self._process(line))
+        if sender in self._entered and not any("error" in answer for answer in answers):
             self._entered[sender] = asyncio.get_running_loop().time()
-        for answer in self._process(line):
+            self._senders.add(sender)
+        for answer in answers:
             text = encode_line(answer)
             for client in ([sender] if sender else []) if "error" in answer else list(self._entered):
                 self._send(client, text)

@@ -234,6 +234,8 @@ def courses_of(
     field: str, platform: Any, pose: Floats, actions: Floats, times: Floats, abilities: Abilities | None = None
 ) -> Floats:
     """Return (num_actions, num_times, pose_dim) poses after each action; `InputError` as `course_of`."""
+    if not len(times):  # at the last scan, and no case for platforms to consider
+        return np.empty((len(actions), 0, len(pose)))
     if (abilities or Abilities.of(platform)).takes_many_actions:
         courses = platform.courses(pose.copy(), actions.copy(), times.copy())
         return _checked(f"{field}.courses", courses, (len(actions), len(times)), pose)

@@ -7,7 +7,9 @@ manifest states it (`stopped`). A folder is written atomically.
 
 from __future__ import annotations
 
+import contextlib
 import hashlib
+import itertools
 import json
 import platform
 import shlex
@@ -30,6 +32,7 @@ from vedette.simulation.tables import run_facts
 FORMAT = "vedette-run"
 MANIFEST, TIMINGS = "manifest.json", "timings.arrow"
 SCENARIO = "scenario.yaml"
+UNFINISHED = ".unfinished"  # in a folder whose tracks or figures are not all written
 _PACKAGES = ("vedette", "numpy", "scipy", "numba")
 
 
@@ -40,6 +43,7 @@ def save_run(
     scenario_text: str | None = None,
     fit: Mapping[str, Any] | None = None,
     overwrite: bool = False,
+    unfinished: bool = False,
 ) -> Path:
     """Write a run as a new folder.
 
@@ -49,6 +53,8 @@ def save_run(
         scenario_text: text of the scenario, stored with the results.
         fit: of the model to recorded scans (`vedette.evaluation.fit.Fit.to_dict`), kept in the manifest.
         overwrite: replace a folder that holds a run; a folder that holds anything else is never replaced.
+        unfinished: mark the folder with a file `UNFINISHED`, to be deleted when its other files are written too; until
+            then it may be replaced without `overwrite`.
 
     Returns the folder. Raises `InputError` if it exists already, cannot be written, or the record contradicts itself.
     """
@@ -58,6 +64,8 @@ def save_run(
     if scenario_text is not None:
         files[SCENARIO] = scenario_text.encode()
     files[MANIFEST] = json.dumps(_manifest(record, files, fit), indent=2, sort_keys=True).encode() + b"\n"
+    if unfinished:
+        files[UNFINISHED] = b""
     try:
         target.parent.mkdir(parents=True, exist_ok=True)
         with tempfile.TemporaryDirectory(dir=target.parent, prefix=f".{target.name}.") as scratch:
@@ -203,22 +211,37 @@ def _read(path: Path) -> bytes:
         raise InputError(f"{path}: expected a file of a saved run; {error}") from error
 
 
-def check_target(target: Path, overwrite: bool) -> None:
-    """Raise `InputError` unless a run may be saved there.
+def check_target(target: Path, overwrite: bool) -> tuple[int, ...]:
+    """Return the identity of the run that a folder holds, () if none; raise `InputError` unless one may be saved there.
 
-    The place must be new, empty, or a run that may be overwritten, and its parent folder must be writable.
+    The place must be new, empty, or a run that is unfinished or may be overwritten, and its parent folder must be
+    writable.
     """
     reason = f"{target} is no folder" if target.exists() and not target.is_dir() else unwritable(target)
     if reason:
         raise InputError(f"directory: expected a folder that may be written to; got {target}: {reason}")
     if not target.exists() or (target.is_dir() and not any(target.iterdir())):
-        return
-    if not overwrite:
+        return ()
+    if not overwrite and not (target / UNFINISHED).exists():
         raise InputError(
             f"directory: expected a new folder; {target} exists (--overwrite or overwrite=True replaces it)"
         )
     if not holds_run(target):
         raise InputError(f"directory: expected a folder that holds a run; {target} holds something else and is kept")
+    state = (target / MANIFEST).stat()
+    return state.st_ino, state.st_mtime_ns
+
+
+def unchanged_target(target: Path, overwrite: bool, identity: tuple[int, ...]) -> Path:
+    """Return the folder if it is as it was when `check_target` returned `identity`; else a new one of a similar name.
+
+    This keeps what another process has written there in the meantime.
+    """
+    with contextlib.suppress(InputError, OSError):
+        if check_target(target, overwrite) == identity:
+            return target
+    similar = (target.with_name(f"{target.name}-{number}") for number in itertools.count(2))
+    return next(folder for folder in similar if not folder.exists())
 
 
 def _swap_in(fresh: Path, target: Path, old: Path) -> None:

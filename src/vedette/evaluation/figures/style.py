@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import io
-import os
+import shutil
 import warnings
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from functools import lru_cache, wraps
+from functools import lru_cache, partial, wraps
 from importlib import resources
 from pathlib import Path
 from typing import Any, ParamSpec, TypeVar
@@ -23,6 +23,7 @@ from matplotlib.font_manager import FontProperties
 from matplotlib.textpath import text_to_path
 
 from vedette.errors import InputError
+from vedette.internal.files import write_file
 from vedette.internal.text import with_minus
 from vedette.kernels.base.types import Floats
 
@@ -197,14 +198,12 @@ def save_figure(figure: Figure, path: Path | str, *, formats: Sequence[str] = _F
     if unknown:
         raise InputError(f"formats: expected some of {', '.join(_FORMATS)}; got {', '.join(unknown)}")
     stem = Path(path)
-    try:
-        stem.parent.mkdir(parents=True, exist_ok=True)
-        with _restored(figure):
-            return tuple(_save(figure, stem.with_name(f"{stem.name}.{name}"), name) for name in formats)
-    except OSError as error:
-        raise InputError(
-            f"path: expected a place to write figures; got {error.filename or stem}: {error.strerror}"
-        ) from error
+    files = [stem.with_name(f"{stem.name}.{name}") for name in formats]
+    with _restored(figure):
+        drawn = [_drawn(figure, name) for name in formats]  # in memory, as matplotlib reports a full disk in pages
+    for file, content in zip(files, drawn, strict=True):
+        write_file(file, partial(shutil.copyfileobj, content), make_folder=True)
+    return tuple(files)
 
 
 @styled
@@ -239,16 +238,14 @@ def _restored(figure: Figure) -> Iterator[None]:
         figure.dpi = dpi
 
 
-def _save(figure: Figure, path: Path, name: str) -> Path:
-    partial = path.with_name(f".{path.name}.{os.getpid()}.part")
+def _drawn(figure: Figure, name: str) -> io.BytesIO:
+    """Return the file of a figure in a format, and keep its layout for further ones."""
+    out = io.BytesIO()
     figure.dpi = _DOTS_PER_INCH  # for raster parts; printing a PDF or an SVG changes it
-    try:
-        _print(figure, partial, name)
-        partial.replace(path)
-    finally:
-        partial.unlink(missing_ok=True)
+    _print(figure, out, name)
     figure.set_layout_engine("none")
-    return path
+    out.seek(0)
+    return out
 
 
 def _print(figure: Figure, file: Any, name: str) -> None:

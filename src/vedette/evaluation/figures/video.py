@@ -33,7 +33,7 @@ from vedette.evaluation.figures.tracks import (
 from vedette.evaluation.recording_metadata import recording_metadata
 from vedette.evaluation.scans import PLANE_SHAPES, Scans, measurement_code, plane_coordinates, scans_of_record
 from vedette.evaluation.track_formats import utc_text
-from vedette.internal.files import write_whole
+from vedette.internal.files import write_file
 from vedette.internal.text import elided
 from vedette.kernels.base.types import Floats, Ints
 from vedette.scenarios import Scenario
@@ -108,12 +108,11 @@ def write_video(
                 raise KeyboardInterrupt from None
             messages = str(getattr(error, "stderr", None) or error).strip().splitlines()[-1:]
             raise InputError(f"{path}: expected ffmpeg to write it; it failed: {' '.join(messages)}") from error
-        try:
-            path.parent.mkdir(parents=True, exist_ok=True)
-            with partial.open("rb") as video:
-                write_whole(path, lambda file: shutil.copyfileobj(video, file))
         except OSError as error:
-            raise InputError(f"path: expected a place to write a video; got {path}: {error.strerror}") from error
+            room = f"expected room in {folder} until the video is whole"
+            raise InputError(f"{path}: {room}; {error.strerror or error}") from error
+        with partial.open("rb") as video:
+            write_file(path, lambda file: shutil.copyfileobj(video, file), make_folder=True)
     return num_frames
 
 
