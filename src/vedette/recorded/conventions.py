@@ -82,6 +82,8 @@ class Conventions:
         bearings: zero and sense of bearings and headings: "north", clockwise, like a compass; or "east",
             counter-clockwise, like the library.
         scan_window: s; rows of a sensor within this time after its first make one scan, at the mean of their times.
+        empty_scans: "found": between the rows of a sensor with a regular period, a scan without rows found nothing;
+            "none": the sensor did not scan.
         bad_rows: "refuse": an unreadable row is an error; "skip": it is left out and counted.
 
     Raises:
@@ -93,6 +95,7 @@ class Conventions:
     bearings: Bearings | None = None
     scan_window: float = 0.0
     bad_rows: Literal["refuse", "skip"] = "refuse"
+    empty_scans: Literal["found", "none"] = "found"
 
     def __post_init__(self) -> None:
         known = ("time", "sensor", *UNITS)
@@ -109,5 +112,7 @@ class Conventions:
             raise reject("bearings", "east or north", self.bearings)
         if self.bad_rows not in ("refuse", "skip"):
             raise reject("bad_rows", "refuse or skip", self.bad_rows)
+        if self.empty_scans not in ("found", "none"):
+            raise reject("empty_scans", "found or none", self.empty_scans)
         if not 0.0 <= self.scan_window < math.inf:
             raise reject("scan_window", "seconds, at least 0", self.scan_window)

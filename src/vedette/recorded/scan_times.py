@@ -120,6 +120,7 @@ class RecordedScans(SummaryRepr):
             "class" is the index of its name in the sensor's `features.reports`.
         gathered: for each sensor, the median time between the first and the last row of its scans of several rows, s; 0
             for a sensor without such scans or whose scans are turns; () if the scans are not from rows.
+        empty: descriptions of the scans without a row that were found, one for each sensor with any.
     """
 
     times: Floats
@@ -133,6 +134,7 @@ class RecordedScans(SummaryRepr):
     notes: tuple[str, ...] = ()
     file: ScansFile = field(default_factory=ScansFile)
     gathered: tuple[float, ...] = ()
+    empty: tuple[str, ...] = ()
     accuracy: tuple[tuple[Floats | None, ...], ...] = ()
     accuracy_columns: tuple[tuple[str, ...], ...] = ()
 

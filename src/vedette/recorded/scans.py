@@ -14,7 +14,9 @@ from vedette.internal.quantities import COMPONENTS, PLACED
 from vedette.internal.text import shown
 from vedette.kernels.base.types import Floats
 from vedette.models.bias import NO_BIAS
+from vedette.models.row_noise import measured_part
 from vedette.recorded.conventions import Conventions
+from vedette.recorded.empty_scans import empty_scans
 from vedette.recorded.extents import places_of, wild
 from vedette.recorded.geography import Origin
 from vedette.recorded.rows import Row, Rows
@@ -52,14 +54,16 @@ def parse_scans(
     readable, skipped = rows.read()
     if not readable:
         raise InputError(f"{table.source}: expected at least one row that can be read; got none of {len(table.rows)}")
+    marked = {row.sensor for row in readable if row.measured is None}
     readable, beyond = _without_wild(readable, table, sites)
-    recording = _at_instants(readable, rows, skipped + beyond)
+    recording = _at_instants(readable, rows, skipped + beyond, marked)
     notes = (*table.notes, *rows.without_velocity(recording.poses))
-    gathered, file = recording.gathered, ScansFile(Path(table.source).name, table.sha256)
+    gathered, empty, file = recording.gathered, recording.empty, ScansFile(Path(table.source).name, table.sha256)
     if any(site.bias != NO_BIAS for site in sites):
         recording = remove_biases(recording, sites)
     columns = tuple(names or () for names in rows.accuracy)
-    return replace(recording, unused=rows.unused, notes=notes, file=file, gathered=gathered, accuracy_columns=columns)
+    facts = replace(recording, unused=rows.unused, notes=notes, file=file, accuracy_columns=columns)
+    return replace(facts, gathered=gathered, empty=empty)
 
 
 def _without_wild(rows: list[Row], table: Table, sites: Sequence[RecordedSensor]) -> tuple[list[Row], tuple[str, ...]]:
@@ -89,9 +93,12 @@ def _without_wild(rows: list[Row], table: Table, sites: Sequence[RecordedSensor]
     return [*emptied.values(), *(row for i, row in enumerate(rows) if i not in emptied)], tuple(texts)
 
 
-def _at_instants(rows: list[Row], how: Rows, skipped: tuple[str, ...]) -> RecordedScans:
-    """Return rows with one sensor and time as scans, scans with one time as instants."""
-    looks, sites, window = [], how.sites, how.conventions.scan_window
+def _at_instants(rows: list[Row], how: Rows, skipped: tuple[str, ...], marked: set[int]) -> RecordedScans:
+    """Return rows with one sensor and time as scans, scans with one time as instants.
+
+    marked: sensors with rows of empty cells; they have no other empty scans.
+    """
+    looks, sites, window, texts = list[RecordedScan](), how.sites, how.conventions.scan_window, dict[str, str]()
     spans = [0.0] * len(sites)
     for s, site in enumerate(sites):
         own = sorted((row for row in rows if row.sensor == s), key=lambda row: row.time)
@@ -102,12 +109,41 @@ def _at_instants(rows: list[Row], how: Rows, skipped: tuple[str, ...]) -> Record
         groups = _groups(own, window)
         if several := [group[-1].time - group[0].time for group in groups if len(group) > 1]:
             spans[s] = float(np.median(several))
+        with_rows = list[RecordedScan]()
         for group in groups:
             time = math.fsum(row.time for row in group) / len(group) if window > 0.0 else group[0].time
             pose = np.array(group[-1].pose)
-            looks.append(RecordedScan(time, s, _scan(group, site), pose, _accuracy(group, how.accuracy[s])))
+            with_rows.append(RecordedScan(time, s, _scan(group, site), pose, _accuracy(group, how.accuracy[s])))
+        looks += with_rows
+        if how.conventions.empty_scans == "found" and s not in marked:
+            empty, texts[site.name] = _without_rows(with_rows, site)
+            looks += empty
     recording = group_by_time(looks, poses_at_sites(sites, looks), 0.0, how.is_utc, skipped, how.bearings)
-    return replace(recording, gathered=tuple(spans))
+    empty_texts = tuple(f"{name} {text}" for name, text in texts.items() if text)
+    return replace(recording, gathered=tuple(spans), empty=empty_texts)
+
+
+def _without_rows(scans: list[RecordedScan], site: RecordedSensor) -> tuple[list[RecordedScan], str]:
+    """Return the scans between those with rows that have none, and a description; nothing without a period."""
+    dim = len(COMPONENTS[site.kind])
+    places = [
+        places_of(look.scan, look.pose, site.kind) if site.kind in PLACED else measured_part(look.scan, dim)
+        for look in scans
+    ]
+    of_rows = np.repeat(np.arange(len(scans)), [len(each) for each in places])
+    found = empty_scans(
+        np.array([look.time for look in scans]), np.concatenate([np.empty((0, dim))[:, :2], *places]), of_rows
+    )
+    if found is None:
+        return [], ""
+    looks = list[RecordedScan]()
+    for time, k in zip(found.times.tolist(), found.before.tolist(), strict=True):
+        before, after = scans[k], scans[k + 1]
+        pose = before.pose.copy()
+        pose[:2] += (after.pose[:2] - pose[:2]) * (time - before.time) / (after.time - before.time)
+        accuracy = None if before.accuracy is None else before.accuracy[:0]
+        looks.append(before._replace(time=time, scan=before.scan[:0], pose=pose, accuracy=accuracy))
+    return looks, found.description
 
 
 def _looks_of_turns(rows: list[Row], sensor: int, how: Rows) -> list[RecordedScan] | None:

@@ -47,6 +47,8 @@ def assumed_sections(
         assumed |= assumed_birth(model, measured, folder, speed, descriptions)
     if turns := _turns(model, recording):
         descriptions["turn"] = turns
+    if recording.empty:
+        descriptions["scans"] = f"{'; '.join(recording.empty)} (recording: {{empty_scans: none}}: only those with rows)"
     return assumed | assumed_clutter(given, model, recording, folder, speed, descriptions)
 
 

@@ -61,6 +61,11 @@ class RecordingSection(Section):
         description="Whether a sensor without `turn` is taken for a turning radar where the bearings and times of its "
         "rows show that it is one; a scan is then one turn, whatever `scan_window` says [-].",
     )
+    empty_scans: Literal["found", "none"] = Field(
+        default="found",
+        description="Whether a scan of a sensor with a regular period is taken for empty where it has no row; not for "
+        "sensors with rows of empty cells, in gaps that are outages, or where rows come by target [-].",
+    )
     merge: NonNegative = Field(
         default=0.0,
         description="Measurements of a scan within this number of noise standard deviations of each other, directly or "
@@ -104,7 +109,7 @@ def _read(
     from vedette.recorded.files import read_table
 
     own = RecordingSection.model_validate_json(section)
-    conventions = Conventions(own.columns, own.units, own.bearings, own.scan_window, own.bad_rows)
+    conventions = Conventions(own.columns, own.units, own.bearings, own.scan_window, own.bad_rows, own.empty_scans)
     return parse_scans(read_table(file, sha256=own.sha256), sites, conventions, origin)
 
 
