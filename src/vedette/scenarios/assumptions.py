@@ -17,6 +17,7 @@ from vedette.recorded import RecordedScans
 from vedette.scenarios.assumed_clutter import assumed_clutter, place_stds
 from vedette.scenarios.region import describe_region, measured_region
 from vedette.scenarios.sections import ScenarioModel
+from vedette.scenarios.sections.undetected import has_intensity
 from vedette.scenarios.sensors_file import EXPECTED_BIRTHS, HEIGHT_STD, measured_birth, measures_heights
 
 _LOST_PER_SECOND = 0.001
@@ -96,11 +97,13 @@ def assumed_birth(
 ) -> dict[str, Any]:
     """Return births from measurements; measured: the scans of each sensor."""
     std = _BIRTH_STDS * _place_std(model, measured, folder)
-    descriptions["birth"] = (
-        f"{EXPECTED_BIRTHS:g} new targets per scan, from measurements that no track explains "
-        f"(std {std:.3g} m, {speed:g} m/s)"
-    )
-    return {"birth": measured_birth(std, speed, model.motion.state_dim, model.has_heights)}
+    section = measured_birth(std, speed, model.motion.state_dim, model.has_heights)
+    rate = f"{EXPECTED_BIRTHS:g} new targets per scan"
+    if has_intensity(model):
+        section["from_measurements"]["expected"] = "learnt"
+        rate = "new targets at a rate learnt from the scans"
+    descriptions["birth"] = f"{rate}, from measurements that no track explains (std {std:.3g} m, {speed:g} m/s)"
+    return {"birth": section}
 
 
 def _place_std(model: ScenarioModel, measured: Sequence[Sequence[Floats]], folder: FilePath) -> float:
