@@ -11,7 +11,7 @@ import numpy as np
 
 from vedette.errors import InputError
 from vedette.internal.quantities import COMPONENTS, PLACED
-from vedette.internal.text import shown
+from vedette.internal.text import pluralise, shown
 from vedette.kernels.base.types import Floats
 from vedette.models.bias import NO_BIAS
 from vedette.models.row_noise import measured_part
@@ -31,6 +31,8 @@ from vedette.recorded.scan_times import (
 from vedette.recorded.tables import Table
 from vedette.recorded.turns import bearings_of, scans_of_turns
 from vedette.simulation.records import ScansFile
+
+_LASTING, _ONE_PLACE = 5, 0.1  # fewest times at which wild rows are at one place, and its size, a share of the distance
 
 
 def parse_scans(
@@ -55,9 +57,9 @@ def parse_scans(
     if not readable:
         raise InputError(f"{table.source}: expected at least one row that can be read; got none of {len(table.rows)}")
     marked = {row.sensor for row in readable if row.measured is None}
-    readable, beyond = _without_wild(readable, table, sites)
+    readable, beyond, lasting = _without_wild(readable, table, sites)
     recording = _at_instants(readable, rows, skipped + beyond, marked)
-    notes = (*table.notes, *rows.without_velocity(recording.poses))
+    notes = (*table.notes, *lasting, *rows.without_velocity(recording.poses))
     gathered, empty, file = recording.gathered, recording.empty, ScansFile(Path(table.source).name, table.sha256)
     if any(site.bias != NO_BIAS for site in sites):
         recording = remove_biases(recording, sites)
@@ -66,11 +68,13 @@ def parse_scans(
     return replace(facts, gathered=gathered, empty=empty)
 
 
-def _without_wild(rows: list[Row], table: Table, sites: Sequence[RecordedSensor]) -> tuple[list[Row], tuple[str, ...]]:
-    """Return the rows, wild ones first and without measurements, and the faults of the wild ones."""
+def _without_wild(
+    rows: list[Row], table: Table, sites: Sequence[RecordedSensor]
+) -> tuple[list[Row], tuple[str, ...], tuple[str, ...]]:
+    """Return the rows, wild ones first and without measurements, the faults of the wild ones, and warnings of them."""
     placed = [i for i, row in enumerate(rows) if row.measured is not None and sites[row.sensor].kind in PLACED]
     if not placed:
-        return rows, ()
+        return rows, (), ()
     placed_rows = [rows[i] for i in placed]
     sensor_places = np.array([row.pose[:2] for row in placed_rows])
     measured = [np.array([row.measured]) for row in placed_rows]
@@ -81,7 +85,8 @@ def _without_wild(rows: list[Row], table: Table, sites: Sequence[RecordedSensor]
         ]
     )
     reaches = np.array([sites[row.sensor].reach for row in placed_rows])
-    is_wild = wild(np.array([row.time for row in placed_rows]), places, sensor_places, reaches)
+    times, sensors = np.array([row.time for row in placed_rows]), np.array([row.sensor for row in placed_rows])
+    is_wild = wild(times, places, sensor_places, reaches)
     texts, emptied = list[str](), dict[int, Row]()
     for j in np.flatnonzero(is_wild).tolist():
         row, away = placed_rows[j], float(np.hypot(*(places[j] - sensor_places[j])))
@@ -90,7 +95,23 @@ def _without_wild(rows: list[Row], table: Table, sites: Sequence[RecordedSensor]
         expected = f"a measurement of {shown(sites[row.sensor].name)} {why}"
         texts.append(f"{table.source}, row {table.rows[row.index]}: expected {expected}; got one {away:.0f} m away")
         emptied[placed[j]] = replace(row, measured=None)
-    return [*emptied.values(), *(row for i, row in enumerate(rows) if i not in emptied)], tuple(texts)
+    lasting = [
+        f"{site.name}: {text}"
+        for s, site in enumerate(sites)
+        if (text := _lasting(times[own := is_wild & (sensors == s)], (places - sensor_places)[own]))
+    ]
+    return [*emptied.values(), *(row for i, row in enumerate(rows) if i not in emptied)], tuple(texts), tuple(lasting)
+
+
+def _lasting(times: Floats, off: Floats) -> str:
+    """Return a warning of wild rows that stay at one place, perhaps a target; empty without any. off: (num, 2) m."""
+    middle = np.median(off, axis=0) if len(off) else np.zeros(2)
+    stay = times[np.hypot(*(off - middle).T) <= _ONE_PLACE * np.hypot(*middle)]
+    if len(np.unique(stay)) < _LASTING:
+        return ""
+    where = f"about {np.hypot(*middle):.0f} m away between t = {stay.min():g} and {stay.max():g} s"
+    cure = "if they are of a target, give the sensor a `detection` with a max_range beyond it"
+    return f"{pluralise(len(stay), 'row')} left out, far beyond all others but {where}: {cure}"
 
 
 def _at_instants(rows: list[Row], how: Rows, skipped: tuple[str, ...], marked: set[int]) -> RecordedScans:
