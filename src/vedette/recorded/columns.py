@@ -33,12 +33,13 @@ class ScanColumns:
         for quantity, units in UNITS.items():
             if (column := self._found(quantity, units)) is not None:
                 self._columns[quantity] = column
-        self._time = self._plain("time")
+        self._time, self._time_unit = self._columns.get("time") or (self._plain("time"), 1.0)
         self._sensor = self._plain("sensor") if len(sites) > 1 or self._has_sensor() else None
         self._numbers = {site.name: s for s, site in enumerate(sites)} | {
             str(s): s - 1 for s in range(1, len(sites) + 1) if str(s) not in {site.name for site in sites}
         }
         self.is_utc = are_dates(table.columns[self._time])
+        self.notes = list[str]()
         self._check()
         self.accuracy = tuple(map(self._accuracy, sites))
 

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+
+import numpy as np
 
 from vedette.errors import InputError
 from vedette.internal.quantities import ANGLES, COMPONENTS, HEIGHT_DEPENDENT, QUANTITIES, is_doppler, is_position
-from vedette.internal.text import shown
+from vedette.internal.text import pluralise, shown
 from vedette.kernels.base.types import OWN_HEIGHT, OWN_VELOCITY
 from vedette.models.pose_noise import PoseStds, pose_noise
 from vedette.models.row_noise import row_noise
@@ -16,7 +18,7 @@ from vedette.recorded.columns import ScanColumns
 from vedette.recorded.conventions import GAPS, MOST, ONE_PLACE, ONE_PLACE_SHARE, OVER_A_TURN, OWN_SPEEDS, UNITS
 from vedette.recorded.geography import PLANE_REACH
 from vedette.recorded.scan_times import turned
-from vedette.recorded.tables import FARTHEST, LATEST, is_empty, is_number, number, seconds
+from vedette.recorded.tables import FARTHEST, LATEST, across_midnight, is_empty, is_number, number, seconds
 
 _OWN_POSE = ("own_x", "own_y", "own_lon", "own_lat", "own_heading")
 
@@ -46,7 +48,18 @@ class Rows(ScanColumns):
                 if self.conventions.bad_rows == "refuse":
                     raise
                 skipped.append(str(error))
-        return readable, tuple(skipped)
+        return self._over_midnight(readable), tuple(skipped)
+
+    def _over_midnight(self, rows: list[Row]) -> list[Row]:
+        """Return the rows with times that increase over midnight, and note if seconds of the day pass it."""
+        clock = np.array([row.time for row in rows])
+        times = clock if self.is_utc else across_midnight(clock)
+        if (times == clock).all():
+            return rows
+        num = int(np.count_nonzero(times > clock))
+        pass_it = f"{self.table.source}: times are seconds of the day and pass midnight: {pluralise(num, 'row')}"
+        self.notes.append(f"{pass_it} counted from the day before (else give dates)")
+        return [replace(row, time=time) for row, time in zip(rows, times.tolist(), strict=True)]
 
     def _row(self, i: int) -> Row:
         s = self._site(i)
@@ -68,12 +81,12 @@ class Rows(ScanColumns):
         """Return the time of a row, all as dates or all as numbers."""
         cell = self.table.columns[self._time][i]
         try:
-            time = seconds(cell)
+            time = (1.0 if self.is_utc else self._time_unit) * seconds(cell)
         except (TypeError, ValueError, OverflowError):
             time = math.nan
         if not abs(time) <= LATEST or is_number(cell) == self.is_utc:
             number = (
-                f"a number of seconds from {-LATEST:g} to {LATEST:g}"
+                f"a number of seconds from {-LATEST:g} to {LATEST:g} (of milliseconds: `units: {{time: ms}}`)"
                 if abs(time) > LATEST
                 else "a finite number of seconds"
             )

@@ -59,7 +59,7 @@ def parse_scans(
     marked = {row.sensor for row in readable if row.measured is None}
     readable, beyond, lasting = _without_wild(readable, table, sites)
     recording = _at_instants(readable, rows, skipped + beyond, marked)
-    notes = (*table.notes, *lasting, *rows.without_velocity(recording.poses))
+    notes = (*table.notes, *rows.notes, *lasting, *rows.without_velocity(recording.poses))
     gathered, empty, file = recording.gathered, recording.empty, ScansFile(Path(table.source).name, table.sha256)
     if any(site.bias != NO_BIAS for site in sites):
         recording = remove_biases(recording, sites)

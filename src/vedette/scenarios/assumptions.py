@@ -21,6 +21,7 @@ from vedette.scenarios.sections.undetected import has_intensity
 from vedette.scenarios.sensors_file import EXPECTED_BIRTHS, HEIGHT_STD, measured_birth, measures_heights
 
 _LOST_PER_SECOND = 0.001
+_SLOW = 10.0  # s between scans, from which on times may be in another unit than seconds
 _BIRTH_STDS = 2.0  # times the upper quartile of the noise of measured places
 
 
@@ -39,6 +40,8 @@ def assumed_sections(
     if "region" not in given:
         assumed["region"] = region = measured_region(model, recording)
         descriptions["region"] = f"{describe_region(region)} (box around all measurements and sensors)"
+    if "motion" not in given:
+        _check_period(period, assumed.get("region") or model.region.model_dump(), speed)
     assumed |= assumed_motion(given, speed, descriptions)
     if "birth" not in given:
         measured = [
@@ -51,6 +54,15 @@ def assumed_sections(
     if recording.empty:
         descriptions["scans"] = f"{'; '.join(recording.empty)} (recording: {{empty_scans: none}}: only those with rows)"
     return assumed | assumed_clutter(given, model, recording, folder, speed, descriptions)
+
+
+def _check_period(period: float, region: Mapping[str, Any], speed: float) -> None:
+    """Raise `InputError` if targets could cross the region between two scans, as with times in another unit."""
+    diagonal = math.hypot(region["x_max"] - region["x_min"], region["y_max"] - region["y_min"])
+    if period >= _SLOW and speed * period > diagonal:
+        expected = f"scans less than {diagonal / speed:.3g} s apart, in which targets of {speed:g} m/s cross the region"
+        cure = "give `recording: {units: {time: ms}}` for times in milliseconds (us, ns), or a lower --max-target-speed"
+        raise InputError(f"recording: expected {expected}; got {period:.6g} s (median): {cure}")
 
 
 def _turns(model: ScenarioModel, recording: RecordedScans) -> str:
