@@ -110,11 +110,9 @@ class Conventions:
         for name, unit in self.units.items():
             if unit not in UNITS.get(name, {}):
                 raise reject(f"units.{name}", f"one of {', '.join(UNITS.get(name, ())) or 'none'}", unit)
-        if self.bearings not in ("east", "north", None):
-            raise reject("bearings", "east or north", self.bearings)
-        if self.bad_rows not in ("refuse", "skip"):
-            raise reject("bad_rows", "refuse or skip", self.bad_rows)
-        if self.empty_scans not in ("found", "none"):
-            raise reject("empty_scans", "found or none", self.empty_scans)
+        words = {"bearings": ("east", "north", None), "bad_rows": ("refuse", "skip"), "empty_scans": ("found", "none")}
+        for name, allowed in words.items():
+            if getattr(self, name) not in allowed:
+                raise reject(name, f"{allowed[0]} or {allowed[1]}", getattr(self, name))
         if not 0.0 <= self.scan_window < math.inf:
             raise reject("scan_window", "seconds, at least 0", self.scan_window)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
 
 import numpy as np
 
@@ -20,19 +19,12 @@ _ROWS, _AHEAD = 10_000, 200  # rows that are searched for the next row at their 
 _SAME_PLACE = 2.0  # times the median distance to the nearest of the rows ahead
 
 
-class EmptyScans(NamedTuple):
-    """Scans of a sensor without a row: times (num,), s, the scan with rows before each (num,), and a description."""
+def empty_scans(times: Floats, rows: Floats, scan_of_rows: Ints) -> tuple[Floats, Ints, str] | None:
+    """Return times of scans without a row, s, the numbers of the scans with rows before them, and a description.
 
-    times: Floats
-    before: Ints
-    description: str
-
-
-def empty_scans(times: Floats, rows: Floats, scan_of_rows: Ints) -> EmptyScans | None:
-    """Return the scans without a row of a sensor; None if its scans have no regular period, or none is empty.
-
-    A gap longer than independent empty scans explain is an outage, in which the sensor did not scan. A sensor whose
-    rows at one place do not follow each other by one period most often reports by target, and has no period.
+    None if the scans of the sensor have no regular period, or none is empty. A gap longer than independent empty
+    scans explain is an outage, in which the sensor did not scan. A sensor whose rows at one place do not follow
+    each other by one period most often reports by target, and has no period.
 
     Args:
         times: (num_scans,) s, increasing, of the scans with rows.
@@ -46,16 +38,14 @@ def empty_scans(times: Floats, rows: Floats, scan_of_rows: Ints) -> EmptyScans |
     counts = np.maximum(np.round(gaps / period).astype(np.int64), 1) - 1
     outages = counts > _longest(counts)
     counts[outages] = 0
-    if not counts.any():
-        return None
-    if not _repeats(rows, np.concatenate([[0], np.cumsum(counts + 1)])[scan_of_rows]):
+    if not counts.any() or not _repeats(rows, np.concatenate([[0], np.cumsum(counts + 1)])[scan_of_rows]):
         return None
     before = np.repeat(np.arange(len(gaps)), counts)
     parts = np.concatenate([np.arange(1, count + 1) / (count + 1) for count in counts[counts > 0].tolist()])
     found = times[before] + parts * gaps[before]
     sizes = f"{pluralise(len(times) + len(found), 'scan')}, of them {len(found)} without a row"
     paused = f"; not in {pluralise(int(outages.sum()), 'longer gap')}, taken for outages" if outages.any() else ""
-    return EmptyScans(found, before, f"{sizes} (one each {period:.4g} s{paused})")
+    return found, before, f"{sizes} (one each {period:.4g} s{paused})"
 
 
 def _period(gaps: Floats) -> float | None:
@@ -91,16 +81,13 @@ def _longest(counts: Ints) -> int:
 def _repeats(rows: Floats, scan_of_rows: Ints) -> bool:
     """Return True if rows near one place follow each other by one scan more often than by any other number."""
     rows, scans = rows[:_ROWS], scan_of_rows[:_ROWS]
-    ahead = range(1, min(_AHEAD, len(rows) - 1) + 1)
-    distances = np.full((len(ahead), len(rows)), math.inf)
-    lags = np.zeros(distances.shape, np.int64)
-    for k, step in enumerate(ahead):
-        lags[k, :-step] = scans[step:] - scans[:-step]
-        apart = np.linalg.norm(rows[step:] - rows[:-step], axis=1)
-        distances[k, :-step] = np.where(lags[k, :-step] > 0, apart, math.inf)
+    own = np.arange(len(rows))
+    others = np.minimum(own + np.arange(1, min(_AHEAD, len(rows) - 1) + 1)[:, np.newaxis], len(rows) - 1)
+    lags = scans[others] - scans
+    distances = np.where(lags > 0, np.linalg.norm(rows[others] - rows, axis=2), math.inf)
     nearest = distances.min(axis=0)
     limit = _SAME_PLACE * float(np.median(nearest[np.isfinite(nearest)]))
     near = distances <= limit
-    first = lags[near.argmax(axis=0), np.arange(len(rows))][near.any(axis=0)]
+    first = lags[near.argmax(axis=0), own][near.any(axis=0)]
     numbers = np.bincount(first, minlength=2)
     return bool(2 * numbers[1] >= numbers.max())

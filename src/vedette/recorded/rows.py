@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from vedette.errors import InputError
+from vedette.internal.covariances import SMALLEST_VARIANCE
 from vedette.internal.quantities import ANGLES, COMPONENTS, HEIGHT_DEPENDENT, QUANTITIES, is_doppler, is_position
 from vedette.internal.text import pluralise, shown
 from vedette.kernels.base.types import OWN_HEIGHT, OWN_VELOCITY
@@ -41,6 +42,10 @@ class Rows(ScanColumns):
     def read(self) -> tuple[list[Row], tuple[str, ...]]:
         """Return the rows that can be read, and the faults of the others."""
         readable, skipped = list[Row](), list[str]()
+        own = [self.table.columns[self._columns[name][0]] for name in _OWN_POSE if name in self._columns]
+        self._moving = {
+            self._label(i) for i, cells in enumerate(zip(*own, strict=True)) if not all(map(is_empty, cells))
+        }
         for i in range(len(self.table.rows)):
             try:
                 readable.append(self._row(i))
@@ -71,11 +76,13 @@ class Rows(ScanColumns):
         """Return the sensor of a row; without a column of sensors, the only one."""
         if self._sensor is None:
             return 0
-        label = str(self.table.columns[self._sensor][i]).strip()
-        if label not in self._numbers:
+        if (label := self._label(i)) not in self._numbers:
             names = ", ".join(shown(site.name) for site in self.sites)
             raise self.table.fault(i, self._sensor, f"a sensor among {names}, or its number from 1")
         return self._numbers[label]
+
+    def _label(self, i: int) -> str:
+        return "" if self._sensor is None else str(self.table.columns[self._sensor][i]).strip()
 
     def _seconds(self, i: int) -> float:
         """Return the time of a row, all as dates or all as numbers."""
@@ -85,13 +92,10 @@ class Rows(ScanColumns):
         except (TypeError, ValueError, OverflowError):
             time = math.nan
         if not abs(time) <= LATEST or is_number(cell) == self.is_utc:
-            number = (
-                f"a number of seconds from {-LATEST:g} to {LATEST:g} (of milliseconds: `units: {{time: ms}}`)"
-                if abs(time) > LATEST
-                else "a finite number of seconds"
+            limits = f" from {-LATEST:g} to {LATEST:g} (of milliseconds: `units: {{time: ms}}`)" * (abs(time) > LATEST)
+            raise self.table.fault(
+                i, self._time, "an ISO 8601 time" if self.is_utc else f"a finite number of seconds{limits}"
             )
-            expected = "an ISO 8601 time" if self.is_utc else number
-            raise self.table.fault(i, self._time, expected)
         return time
 
     def _value(self, i: int, quantity: str) -> float:
@@ -146,7 +150,7 @@ class Rows(ScanColumns):
             return self._report(i, s)
         if name == "xy_correlation":
             return self._correlation(i)
-        return self._value(i, name) if name in ("snr", "size") else self._std(i, name)
+        return self._value(i, name) if name == "snr" else self._positive(i, name)
 
     def _report(self, i: int, s: int) -> float:
         """Return the index of the class that a row reports."""
@@ -176,20 +180,17 @@ class Rows(ScanColumns):
         added = pose_noise(measured, names, pose, of_pose) if any(of_pose) else None
         correlation = own.get("xy_correlation", 0.0)
         return row_noise(
-            stds,
-            missing,
-            correlation=correlation,
-            log_likelihood_ratio=ratio,
-            added=added,
-            log_class_ratios=classes,
+            stds, missing, correlation=correlation, log_likelihood_ratio=ratio, added=added, log_class_ratios=classes
         )
 
     def _is_blank(self, i: int, quantity: str) -> bool:
         return is_empty(self.table.columns[self._columns[quantity][0]][i])
 
-    def _std(self, i: int, quantity: str) -> float:
-        if (value := self._value(i, quantity)) <= 0.0:
-            raise self.table.fault(i, self._columns[quantity][0], "a standard deviation above 0, or an empty cell")
+    def _positive(self, i: int, quantity: str) -> float:
+        value, least = self._value(i, quantity), math.sqrt(SMALLEST_VARIANCE)
+        if value < least:
+            expected = f"a {'size' if quantity == 'size' else 'standard deviation'} above 0, at least {least:g}"
+            raise self.table.fault(i, self._columns[quantity][0], f"{expected}, or an empty cell")
         return value
 
     def _correlation(self, i: int) -> float:
@@ -201,7 +202,8 @@ class Rows(ScanColumns):
         """Return the pose of the sensor; the site gives what is not in the row."""
         site = self.sites[s]
         place: tuple[float, ...] = site.pose[:2]
-        if site.kind == "position" and all(self._is_blank(i, name) for name in _OWN_POSE if name in self._columns):
+        is_blank = all(self._is_blank(i, name) for name in _OWN_POSE if name in self._columns)
+        if is_blank and (site.kind == "position" or self._label(i) not in self._moving):
             return tuple(site.pose)  # positions do not depend on it, and files of several sensors leave it empty
         if {"own_lon", "own_lat"} <= set(self._columns):
             place = self._agreed(i, self._plane(i, "own_lon", "own_lat"), "own_x", "own_y")

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -60,12 +60,10 @@ def parse_scans(
     readable, beyond, lasting = _without_wild(readable, table, sites)
     recording = _at_instants(readable, rows, skipped + beyond, marked)
     notes = (*table.notes, *rows.notes, *lasting, *rows.without_velocity(recording.poses))
-    gathered, empty, file = recording.gathered, recording.empty, ScansFile(Path(table.source).name, table.sha256)
+    file, columns = ScansFile(Path(table.source).name, table.sha256), tuple(names or () for names in rows.accuracy)
     if any(site.bias != NO_BIAS for site in sites):
         recording = remove_biases(recording, sites)
-    columns = tuple(names or () for names in rows.accuracy)
-    facts = replace(recording, unused=rows.unused, notes=notes, file=file, accuracy_columns=columns)
-    return replace(facts, gathered=gathered, empty=empty)
+    return replace(recording, unused=rows.unused, notes=notes, file=file, accuracy_columns=columns)
 
 
 def _without_wild(
@@ -77,11 +75,10 @@ def _without_wild(
         return rows, (), ()
     placed_rows = [rows[i] for i in placed]
     sensor_places = np.array([row.pose[:2] for row in placed_rows])
-    measured = [np.array([row.measured]) for row in placed_rows]
     places = np.concatenate(
         [
-            places_of(scan, at, sites[row.sensor].kind)
-            for scan, at, row in zip(measured, sensor_places, placed_rows, strict=True)
+            places_of(_scan([row], sites[row.sensor]), np.array(row.pose[:2]), sites[row.sensor].kind)
+            for row in placed_rows
         ]
     )
     reaches = np.array([sites[row.sensor].reach for row in placed_rows])
@@ -95,23 +92,21 @@ def _without_wild(
         expected = f"a measurement of {shown(sites[row.sensor].name)} {why}"
         texts.append(f"{table.source}, row {table.rows[row.index]}: expected {expected}; got one {away:.0f} m away")
         emptied[placed[j]] = replace(row, measured=None)
-    lasting = [
-        f"{site.name}: {text}"
-        for s, site in enumerate(sites)
-        if (text := _lasting(times[own := is_wild & (sensors == s)], (places - sensor_places)[own]))
-    ]
+    lasting, off = list[str](), places - sensor_places
+    for s in set(sensors[is_wild].tolist()):
+        own = is_wild & (sensors == s)
+        lasting += _lasting(sites[s].name, times[own], off[own])
     return [*emptied.values(), *(row for i, row in enumerate(rows) if i not in emptied)], tuple(texts), tuple(lasting)
 
 
-def _lasting(times: Floats, off: Floats) -> str:
-    """Return a warning of wild rows that stay at one place, perhaps a target; empty without any. off: (num, 2) m."""
-    middle = np.median(off, axis=0) if len(off) else np.zeros(2)
+def _lasting(name: str, times: Floats, off: Floats) -> Iterator[str]:
+    """Yield a warning of wild rows that stay at one place, perhaps a target. off: (num, 2) m from the sensor."""
+    middle = np.median(off, axis=0)
     stay = times[np.hypot(*(off - middle).T) <= _ONE_PLACE * np.hypot(*middle)]
-    if len(np.unique(stay)) < _LASTING:
-        return ""
-    where = f"about {np.hypot(*middle):.0f} m away between t = {stay.min():g} and {stay.max():g} s"
-    cure = "if they are of a target, give the sensor a `detection` with a max_range beyond it"
-    return f"{pluralise(len(stay), 'row')} left out, far beyond all others but {where}: {cure}"
+    if len(np.unique(stay)) >= _LASTING:
+        where = f"about {np.hypot(*middle):.0f} m away between t = {stay.min():g} and {stay.max():g} s"
+        cure = "if they are of a target, give the sensor a `detection` with a max_range beyond it"
+        yield f"{name}: {pluralise(len(stay), 'row')} left out, far beyond all others but {where}: {cure}"
 
 
 def _at_instants(rows: list[Row], how: Rows, skipped: tuple[str, ...], marked: set[int]) -> RecordedScans:
@@ -136,7 +131,7 @@ def _at_instants(rows: list[Row], how: Rows, skipped: tuple[str, ...], marked: s
             pose = np.array(group[-1].pose)
             with_rows.append(RecordedScan(time, s, _scan(group, site), pose, _accuracy(group, how.accuracy[s])))
         looks += with_rows
-        if how.conventions.empty_scans == "found" and s not in marked:
+        if with_rows and how.conventions.empty_scans == "found" and s not in marked:
             empty, texts[site.name] = _without_rows(with_rows, site)
             looks += empty
     recording = group_by_time(looks, poses_at_sites(sites, looks), 0.0, how.is_utc, skipped, how.bearings)
@@ -146,25 +141,23 @@ def _at_instants(rows: list[Row], how: Rows, skipped: tuple[str, ...], marked: s
 
 def _without_rows(scans: list[RecordedScan], site: RecordedSensor) -> tuple[list[RecordedScan], str]:
     """Return the scans between those with rows that have none, and a description; nothing without a period."""
-    dim = len(COMPONENTS[site.kind])
+    is_placed, dim = site.kind in PLACED, len(COMPONENTS[site.kind])
     places = [
-        places_of(look.scan, look.pose, site.kind) if site.kind in PLACED else measured_part(look.scan, dim)
-        for look in scans
+        places_of(look.scan, look.pose, site.kind) if is_placed else measured_part(look.scan, dim) for look in scans
     ]
     of_rows = np.repeat(np.arange(len(scans)), [len(each) for each in places])
-    found = empty_scans(
-        np.array([look.time for look in scans]), np.concatenate([np.empty((0, dim))[:, :2], *places]), of_rows
-    )
+    found = empty_scans(np.array([look.time for look in scans]), np.concatenate(places), of_rows)
     if found is None:
         return [], ""
     looks = list[RecordedScan]()
-    for time, k in zip(found.times.tolist(), found.before.tolist(), strict=True):
+    times, before_scans, text = found
+    for time, k in zip(times.tolist(), before_scans.tolist(), strict=True):
         before, after = scans[k], scans[k + 1]
         pose = before.pose.copy()
         pose[:2] += (after.pose[:2] - pose[:2]) * (time - before.time) / (after.time - before.time)
         accuracy = None if before.accuracy is None else before.accuracy[:0]
         looks.append(before._replace(time=time, scan=before.scan[:0], pose=pose, accuracy=accuracy))
-    return looks, found.description
+    return looks, text
 
 
 def _looks_of_turns(rows: list[Row], sensor: int, how: Rows) -> list[RecordedScan] | None:
@@ -186,10 +179,9 @@ def _looks_of_turns(rows: list[Row], sensor: int, how: Rows) -> list[RecordedSca
 def _groups(rows: list[Row], window: float) -> list[list[Row]]:
     groups: list[list[Row]] = []
     for row in rows:
-        if groups and row.time - groups[-1][0].time <= window:
-            groups[-1].append(row)
-        else:
-            groups.append([row])
+        if not groups or row.time - groups[-1][0].time > window:
+            groups.append([])
+        groups[-1].append(row)
     return groups
 
 

@@ -69,10 +69,7 @@ class Table:
         return values
 
     def times(self, name: str) -> Floats:
-        """Return a column of times as seconds; its cells are numbers or ISO 8601 times, as most of them are.
-
-        Numbers have the unit at the end of the name, or are seconds.
-        """
+        """Return a column as seconds: numbers, in the unit at the end of its name, or ISO 8601, as most cells are."""
         cells = self.column(name)
         if not are_dates(cells):
             unit = TIMES.get(name.rpartition("_")[2], 1.0)

@@ -69,9 +69,7 @@ def _turns(model: ScenarioModel, recording: RecordedScans) -> str:
     """Describe the turns that were found from the rows and not given; empty if there are none."""
     texts = []
     for s, (name, sensor) in enumerate(zip(model.sensor_names, model.sensors, strict=True)):
-        sensor_poses = [
-            poses[s] for scans, poses in zip(recording.scans, recording.poses, strict=True) if scans[s] is not None
-        ]
+        sensor_poses = [poses[s] for k, poses in enumerate(recording.poses) if recording.scans[k][s] is not None]
         rates = [pose[BEAM + 1] for pose in sensor_poses if is_turn(pose)]
         if sensor.turn is None and rates:
             rate = float(np.median(rates))

@@ -36,8 +36,7 @@ def courses_to_headings(data: Mapping[str, Any]) -> Mapping[str, Any]:
         return data
     from vedette.platforms.compass import PlaneCompass
 
-    origin = read_origin(data)
-    compass, shared_settings = origin or PlaneCompass(), defaults if _is_mapping(defaults) else {}
+    compass, shared_settings = read_origin(data) or PlaneCompass(), defaults if _is_mapping(defaults) else {}
     inherited = {key: shared_settings[key] for key in ("course_deg", "platform") if key in shared_settings}
     converted = {**data}
     if isinstance(sensors, list | tuple):
