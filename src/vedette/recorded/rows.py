@@ -92,10 +92,9 @@ class Rows(ScanColumns):
         except (TypeError, ValueError, OverflowError):
             time = math.nan
         if not abs(time) <= LATEST or is_number(cell) == self.is_utc:
-            limits = f" from {-LATEST:g} to {LATEST:g} (of milliseconds: `units: {{time: ms}}`)" * (abs(time) > LATEST)
-            raise self.table.fault(
-                i, self._time, "an ISO 8601 time" if self.is_utc else f"a finite number of seconds{limits}"
-            )
+            limits = f"number of seconds from {-LATEST:g} to {LATEST:g} (of milliseconds: `units: {{time: ms}}`)"
+            number = limits if abs(time) > LATEST else "finite number of seconds"
+            raise self.table.fault(i, self._time, "an ISO 8601 time" if self.is_utc else f"a {number}")
         return time
 
     def _value(self, i: int, quantity: str) -> float:

@@ -48,7 +48,7 @@ def assumed_sections(
             [scan for scans in recording.scans if (scan := scans[s]) is not None and len(scan)]
             for s in range(len(model.sensors))
         ]
-        assumed |= assumed_birth(model, measured, folder, speed, descriptions)
+        assumed |= assumed_birth(model, measured, folder, speed, descriptions, learnt=has_intensity(model))
     if turns := _turns(model, recording):
         descriptions["turn"] = turns
     if recording.empty:
@@ -104,12 +104,13 @@ def assumed_birth(
     folder: FilePath,
     speed: float,
     descriptions: dict[str, str],
+    learnt: bool = False,
 ) -> dict[str, Any]:
-    """Return births from measurements; measured: the scans of each sensor."""
+    """Return births from measurements. measured: the scans of each sensor; learnt: True to learn their rate."""
     std = _BIRTH_STDS * _place_std(model, measured, folder)
     section = measured_birth(std, speed, model.motion.state_dim, model.has_heights)
     rate = f"{EXPECTED_BIRTHS:g} new targets per scan"
-    if has_intensity(model):
+    if learnt:
         section["from_measurements"]["expected"] = "learnt"
         rate = "new targets at a rate learnt from the scans"
     descriptions["birth"] = f"{rate}, from measurements that no track explains (std {std:.3g} m, {speed:g} m/s)"
