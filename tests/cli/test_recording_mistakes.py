@@ -41,7 +41,8 @@ def test_a_time_in_milliseconds(place: Path) -> None:
     lines = (place / "scans.csv").read_text().splitlines()
     rows = [f"1452603741{i:03},{line.partition(',')[2]}" for i, line in enumerate(lines[1:])]
     (place / "scans.csv").write_text("\n".join([lines[0], *rows]))
-    told = f"{place / 'scans.csv'}, row 2, column 'time': expected a number of seconds from -1e+12 to 1e+12; got '"
+    told = f"{place / 'scans.csv'}, row 2, column 'time': expected a number of seconds from -1e+12 to 1e+12 "
+    told += "(of milliseconds: `units: {time: ms}`); got '"
     assert refused("radars.yaml", "Calshot", "Calshot").startswith(told)
 
 

@@ -31,7 +31,7 @@ def test_scans_become_tracks_results_and_a_picture(place: Path) -> None:
     assert " (3 with at least 10 estimates), " in result.stdout
     assert "Wrote out: tracks/tracks.csv, tracks/tracks.geojson, figures/, 5 tables" in result.stdout
     assert "\nAssumed, because radars.yaml does not give it:\n  region      x -" in result.stderr
-    assert "\n  birth       0.5 new targets per scan, from measurements that no track" in result.stderr
+    assert "\n  birth       new targets at a rate learnt from the scans, from measurements" in result.stderr
     assert {path.name for path in (place / "out").iterdir()} >= {"tracks", "figures", "manifest.json", "scenario.yaml"}
     assert {path.name for path in (place / "out/tracks").iterdir()} == {"tracks.csv", "tracks.geojson"}
     assert load_run(place / "out").planner == "recorded"

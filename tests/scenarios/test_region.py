@@ -74,6 +74,28 @@ def test_one_outlier_changes_ospa_by_less_than_one_percent(tmp_path: Path, detec
             assert changed.sum() <= 1, (place, time)
 
 
+@pytest.mark.parametrize("place", [(9500.0, 0.0), (3e4, 45.0), (3e5, 12.0)])
+@pytest.mark.parametrize("share", [0.008, 0.02])
+def test_rows_at_one_far_place_change_nothing(tmp_path: Path, place: tuple[float, float], share: float) -> None:
+    own, rng = rows(), np.random.default_rng(1)
+    num = int(share * len(own))
+    far = [
+        f"{time},R,{place[0] + rng.normal(0.0, 20.0)},{(place[1] + rng.normal(0.0, 0.4)) % 360.0}"
+        for time in rng.choice(TIMES, num, replace=False).tolist()
+    ]
+    found = recorded(tmp_path, [*own, *far])
+    assert len(found.recording.skipped) == num
+    np.testing.assert_array_equal(ospa(found), ospa(recorded(tmp_path, own)))
+
+
+def test_a_far_target_is_reported_and_a_known_reach_keeps_it(tmp_path: Path) -> None:
+    far = [f"{time},R,30000.0,45.0" for time in TIMES[:7].tolist()]
+    found = recorded(tmp_path, [*rows(), *far])
+    (text,) = (line for line in scenario_warnings(found.scenario) if "left out" in line)
+    assert "R: 7 rows left out, far beyond all others but about 30000 m away between t = 0 and 15 s: " in text
+    assert not recorded(tmp_path, [*rows(), *far], LIMITED.replace("6000", "40000")).recording.skipped
+
+
 def test_an_outlier_is_reported_with_its_row(tmp_path: Path) -> None:
     found = recorded(tmp_path, [*rows(), "35.0,R,300000.0,12.0"])
     (text,) = found.recording.skipped

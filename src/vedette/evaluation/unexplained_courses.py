@@ -119,7 +119,8 @@ def _courses(scans: list[_UnexplainedScan], slowest: float, area: float) -> list
         points = np.array([scans[k].places[i] for k, i in longest])
         begin, end = scans[longest[0][0]].time, scans[longest[-1][0]].time
         speed = float(np.hypot(*(points[-1] - points[0]))) / (end - begin)
-        courses.append(_Course(begin, end, points[0], len(longest), speed))
+        if speed >= slowest:  # else noise makes its steps fast
+            courses.append(_Course(begin, end, points[0], len(longest), speed))
     return courses
 
 

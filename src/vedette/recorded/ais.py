@@ -47,6 +47,9 @@ def read_ais(file: Path) -> tuple[dict[str, list[Any]], list[int], tuple[str, ..
                     lines.append(number)
     if incomplete := open_ones.left():
         lost["of messages that are not complete"] = incomplete
+    if not rows and b"TTM," in file.read_bytes():
+        table = "a .csv table with time, sensor, range_nmi and bearing_deg"
+        raise InputError(f"{file}: expected AIS positions; got TTM sentences, tracks of a radar: write them as {table}")
     if not rows:
         expected = r"AIS positions with times: `\c:1452603741*54\!AIVDM,...`, `2016-01-12T13:02:21Z !AIVDM,...` or "
         raise InputError(f"{file}: expected {expected}`!AIVDM,...*5C,1452603741`; got {_lost_in_words(lost) or 'none'}")

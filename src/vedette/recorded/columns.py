@@ -33,22 +33,20 @@ class ScanColumns:
         for quantity, units in UNITS.items():
             if (column := self._found(quantity, units)) is not None:
                 self._columns[quantity] = column
-        self._time = self._plain("time")
-        self._sensor = self._plain("sensor") if len(sites) > 1 or self._has_sensor() else None
+        self._time, self._time_unit = self._columns.get("time") or (self._plain("time"), 1.0)
+        has_sensor = "sensor" in conventions.columns or "sensor" in table.columns  # a single one needs no column
+        self._sensor = self._plain("sensor") if len(sites) > 1 or has_sensor else None
         self._numbers = {site.name: s for s, site in enumerate(sites)} | {
             str(s): s - 1 for s in range(1, len(sites) + 1) if str(s) not in {site.name for site in sites}
         }
         self.is_utc = are_dates(table.columns[self._time])
+        self.notes = list[str]()
         self._check()
         self.accuracy = tuple(map(self._accuracy, sites))
 
     def service_of(self, sensor: int) -> RadarService | None:
         """Return the turn of a sensor by its service messages; None without any."""
         return next((own for name, own in self.table.service.items() if self._numbers.get(name) == sensor), None)
-
-    def _has_sensor(self) -> bool:
-        """Return True if there is a column of sensors, or one is named; for a single sensor there need not be one."""
-        return "sensor" in self.conventions.columns or "sensor" in self.table.columns
 
     def _has_gaps(self, quantity: str) -> bool:
         """Return True if a row with a measurement has an empty cell of a third component."""
@@ -115,11 +113,8 @@ class ScanColumns:
         if (named := self.conventions.columns.get(quantity)) is not None:
             self.table.column(named)
             return named, self._unit(quantity, named, units)
-        slant = (
-            ("slant_range",)
-            if quantity == "range" and all(site.kind in HEIGHT_DEPENDENT for site in self.sites)
-            else ()
-        )
+        is_slant = quantity == "range" and all(site.kind in HEIGHT_DEPENDENT for site in self.sites)
+        slant = ("slant_range",) if is_slant else ()
         by_lower = {name.casefold(): name for name in reversed([*self.table.columns])}
         for stem in (*slant, quantity, *OTHER_NAMES.get(quantity, ())):
             if stem in self.table.columns:

@@ -11,9 +11,11 @@ from vedette.internal.quantities import ANGLES, HEIGHTS, LENGTHS, QUANTITIES, SP
 from vedette.models.arguments import reject
 from vedette.models.heights import ASSUMED_HEIGHT
 from vedette.recorded.scan_times import Bearings
+from vedette.recorded.tables import TIMES
 
 # Quantities of a row, and the units that may follow at the end of a column's name.
 UNITS: dict[str, Mapping[str, float]] = {
+    "time": TIMES,
     **{name: each.units for name, each in QUANTITIES.items()},
     "lon": {"deg": 1.0},
     "lat": {"deg": 1.0},
@@ -49,7 +51,7 @@ OTHER_NAMES = {
     "longitude": ("lon", "LON"),  # names in reports
     "latitude": ("lat", "LAT"),
     "id": ("mmsi", "MMSI", "icao24", "track_id"),
-    "time": ("time_s", "time_utc", "BaseDateTime"),
+    "time": ("time_s", "time_ms", "time_us", "time_ns", "time_utc", "BaseDateTime"),
     "range": ("distance",),
     "altitude": ("height", "flight_level"),
     "size": ("length",),
@@ -77,11 +79,13 @@ class Conventions:
 
     Attributes:
         columns: name in the table of a quantity, if it differs: {"time": "Time", "sensor": "radar", ...}.
-        units: unit of a quantity ("m", "km", "nmi"; "deg", "rad"), if its column's name does not end with it, as
-            `range_km` and `bearing_deg` do. The default of lengths is m; angles have none.
+        units: unit of a quantity ("m", "km", "nmi"; "deg", "rad"; "s", "ms"), if its column's name does not end with
+            it, as `range_km` and `bearing_deg` do. The defaults are m and s; angles have none.
         bearings: zero and sense of bearings and headings: "north", clockwise, like a compass; or "east",
             counter-clockwise, like the library.
         scan_window: s; rows of a sensor within this time after its first make one scan, at the mean of their times.
+        empty_scans: "found": between the rows of a sensor with a regular period, a scan without rows found nothing;
+            "none": the sensor did not scan.
         bad_rows: "refuse": an unreadable row is an error; "skip": it is left out and counted.
 
     Raises:
@@ -93,9 +97,10 @@ class Conventions:
     bearings: Bearings | None = None
     scan_window: float = 0.0
     bad_rows: Literal["refuse", "skip"] = "refuse"
+    empty_scans: Literal["found", "none"] = "found"
 
     def __post_init__(self) -> None:
-        known = ("time", "sensor", *UNITS)
+        known = tuple(dict.fromkeys(("time", "sensor", *UNITS)))
         for where, given in (("columns", self.columns), ("units", self.units)):
             if not isinstance(given, Mapping):
                 raise reject(where, "a mapping of quantities, such as {range: nmi}", given)
@@ -105,9 +110,9 @@ class Conventions:
         for name, unit in self.units.items():
             if unit not in UNITS.get(name, {}):
                 raise reject(f"units.{name}", f"one of {', '.join(UNITS.get(name, ())) or 'none'}", unit)
-        if self.bearings not in ("east", "north", None):
-            raise reject("bearings", "east or north", self.bearings)
-        if self.bad_rows not in ("refuse", "skip"):
-            raise reject("bad_rows", "refuse or skip", self.bad_rows)
+        words = {"bearings": ("east", "north", None), "bad_rows": ("refuse", "skip"), "empty_scans": ("found", "none")}
+        for name, allowed in words.items():
+            if getattr(self, name) not in allowed:
+                raise reject(name, f"{allowed[0]} or {allowed[1]}", getattr(self, name))
         if not 0.0 <= self.scan_window < math.inf:
             raise reject("scan_window", "seconds, at least 0", self.scan_window)

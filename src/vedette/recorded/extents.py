@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import numpy as np
 from numpy.typing import ArrayLike
 
@@ -55,9 +53,10 @@ def wild(times: Floats, places: Floats, own: Floats, reaches: Floats) -> Bools:
     """Return True for each row of a recording beyond its sensor's reach or far beyond all others, (num,).
 
     On each side of the median an extent ends at the outermost value whose distance is at most 1 / 0.9 times that of two
-    others. At most one row in 50, and at least one, is left out of it on a side, and rows within 5 % of its longer side
-    belong to it, too. One more row therefore moves a side of the extent by at most a ninth of its distance from the
-    median. No row is far beyond the others if there are fewer than 20 rows or 10 times.
+    others that are not all at its place. At most one row in 50, and at least one, is left out of it on a side, and rows
+    within 5 % of its longer side belong to it, too. One more row therefore moves a side of the extent by at most a
+    ninth of its distance from the median, and so do rows at one place, up to one in 50. Rows within a known reach are
+    not far beyond the others, and no row is if there are fewer than 20 rows or 10 times.
 
     Args:
         times: (num,) s.
@@ -70,21 +69,28 @@ def wild(times: Floats, places: Floats, own: Floats, reaches: Floats) -> Bools:
     if np.count_nonzero(near) < _FEWEST or len(np.unique(times)) < _FEWEST_TIMES:
         return beyond
     corners = np.concatenate([_extent(places[near]), _extent(own)])
-    return np.asarray(beyond | ~is_within(places, box_of(corners)))
+    return np.asarray(beyond | (np.isinf(reaches) & ~is_within(places, box_of(corners))))
 
 
 def _extent(places: Floats) -> Floats:
     """Return lower left and upper right corners of places without those far beyond all others, (2, 2)."""
-    return np.array([_ends(places[:, 0]), _ends(places[:, 1])]).T
+    return np.array([[_end(places, axis, side) for axis in (0, 1)] for side in (-1.0, 1.0)])
 
 
-def _ends(values: Floats) -> Sequence[float]:
-    """Return lower and upper end of values."""
-    middle, max_outliers, ends = float(np.median(values)), max(len(values) // _MOST_WILD, 1), list[float]()
-    for side in (-1.0, 1.0):
-        distances = np.sort(side * (values - middle))[::-1]
-        i = 0
-        while i < max_outliers and distances[i + 2] < _LONELY * distances[i]:
+def _end(places: Floats, axis: int, side: float) -> float:
+    """Return the lower or upper end of places along an axis."""
+    middle, max_outliers = float(np.median(places[:, axis])), max(len(places) // _MOST_WILD, 1)
+    order = np.argsort(-side * places[:, axis], kind="stable")
+    distances, i = side * (places[order, axis] - middle), 0
+    while i < max_outliers:
+        group = order[i:][distances[i:] >= _LONELY * distances[i]]
+        apart = np.hypot(*(places[group] - places[order[i]]).T)
+        inner = i + len(group)
+        at_one_place = inner <= max_outliers and bool((apart <= (1.0 - _LONELY) * distances[i]).all())
+        if at_one_place and distances[inner] < _LONELY * distances[inner - 1]:
+            i = inner
+        elif len(group) <= 2:
             i += 1
-        ends.append(middle + side * float(distances[i]))
-    return ends
+        else:
+            break
+    return middle + side * float(distances[i])

@@ -100,20 +100,8 @@ def parse_reports(
     used = {given.get(name, name) for name in _USED} - ({"x", "y"} if origin is not None else set())
     used.add(_altitude_column(table, given)[0])
     unused = () if is_known else tuple(name for name in table.columns if name not in used)
-    return Reports(
-        times[order],
-        tracks,
-        positions[order],
-        velocities,
-        altitudes,
-        tuple(map(str, names)),
-        origin,
-        bounds,
-        repeats,
-        unused,
-        table.notes,
-        table.sha256,
-    )
+    facts = tuple(map(str, names)), origin, bounds, repeats, unused, table.notes, table.sha256
+    return Reports(times[order], tracks, positions[order], velocities, altitudes, *facts)
 
 
 def _altitude_column(table: Table, given: Mapping[str, str]) -> tuple[str, float]:

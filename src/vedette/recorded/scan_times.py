@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Literal, NamedTuple
 
 import numpy as np
@@ -120,6 +120,7 @@ class RecordedScans(SummaryRepr):
             "class" is the index of its name in the sensor's `features.reports`.
         gathered: for each sensor, the median time between the first and the last row of its scans of several rows, s; 0
             for a sensor without such scans or whose scans are turns; () if the scans are not from rows.
+        empty: descriptions of the scans without a row that were found, one for each sensor with any.
     """
 
     times: Floats
@@ -133,6 +134,7 @@ class RecordedScans(SummaryRepr):
     notes: tuple[str, ...] = ()
     file: ScansFile = field(default_factory=ScansFile)
     gathered: tuple[float, ...] = ()
+    empty: tuple[str, ...] = ()
     accuracy: tuple[tuple[Floats | None, ...], ...] = ()
     accuracy_columns: tuple[tuple[str, ...], ...] = ()
 
@@ -147,14 +149,8 @@ class RecordedScans(SummaryRepr):
         """Return the instants from `begin` to before `end`, s of `times`; their times start at 0."""
         low, high = np.searchsorted(self.times, [begin, end]).tolist()
         first = float(self.times[low]) if low < high else 0.0
-        parts = (
-            self.times[low:high] - first,
-            self.start + first,
-            self.is_utc,
-            self.scans[low:high],
-            self.poses[low:high],
-        )
-        return RecordedScans(*parts, self.skipped, self.bearings)
+        parts = {name: getattr(self, name)[low:high] for name in ("scans", "poses", "accuracy")}
+        return replace(self, times=self.times[low:high] - first, start=self.start + first, **parts)
 
     def arrivals(self) -> Iterator[SensorScan]:
         """Yield every scan separately, in order of time, as `OutOfSequenceTracker` takes them; times as in `times`."""
@@ -228,17 +224,18 @@ def group_by_time(
 
 def remove_biases(recording: RecordedScans, sensors: Sequence[RecordedSensor]) -> RecordedScans:
     """Return the recording as its sensors would have made it without their biases."""
-    corrected = []
-    for k, (time, scans, poses) in enumerate(
-        zip(recording.times.tolist(), recording.scans, recording.poses, strict=True)
-    ):
-        for s, scan in enumerate(scans):
-            if scan is not None:
-                accuracy = recording.accuracy[k][s] if recording.accuracy else None
-                recorded = RecordedScan(time, s, scan, poses[s], accuracy)
-                corrected.append(remove_bias(recorded, sensors[s], recording.bearings[s]))
+    accuracy = recording.accuracy or [[None] * len(sensors)] * len(recording.times)
+    recorded_scans = (
+        RecordedScan(time, s, scan, recording.poses[k, s], accuracy[k][s])
+        for k, time in enumerate(recording.times.tolist())
+        for s, scan in enumerate(recording.scans[k])
+        if scan is not None
+    )
+    corrected = [remove_bias(each, sensors[each.sensor], recording.bearings[each.sensor]) for each in recorded_scans]
     facts = recording.start, recording.is_utc, recording.skipped, recording.bearings
-    return group_by_time(corrected, recording.poses[0], *facts)
+    found = group_by_time(corrected, recording.poses[0], *facts)
+    parts = {name: getattr(found, name) for name in ("times", "start", "scans", "poses", "accuracy")}
+    return replace(recording, **parts)
 
 
 def sensor_bias(sensor: RecordedSensor, bearings: Bearings | None) -> tuple[Floats, Floats]:

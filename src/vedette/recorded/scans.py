@@ -1,42 +1,25 @@
-"""Recorded scans of sensors: rows of measurements, in any units and conventions."""
+"""Scans of sensors, built from rows of measurements."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
 from vedette.errors import InputError
-from vedette.internal.quantities import (
-    ANGLES,
-    COMPONENTS,
-    HEIGHT_DEPENDENT,
-    PLACED,
-    QUANTITIES,
-    is_doppler,
-    is_position,
-)
-from vedette.internal.text import shown
-from vedette.kernels.base.types import OWN_HEIGHT, OWN_VELOCITY, Floats
+from vedette.internal.quantities import COMPONENTS, PLACED
+from vedette.internal.text import pluralise, shown
+from vedette.kernels.base.types import Floats
 from vedette.models.bias import NO_BIAS
-from vedette.models.pose_noise import PoseStds, pose_noise
-from vedette.models.row_noise import row_noise
-from vedette.recorded.columns import ScanColumns
-from vedette.recorded.conventions import (
-    GAPS,
-    MOST,
-    ONE_PLACE,
-    ONE_PLACE_SHARE,
-    OVER_A_TURN,
-    OWN_SPEEDS,
-    UNITS,
-    Conventions,
-)
+from vedette.models.row_noise import measured_part
+from vedette.recorded.conventions import Conventions
+from vedette.recorded.empty_scans import empty_scans
 from vedette.recorded.extents import places_of, wild
-from vedette.recorded.geography import PLANE_REACH, Origin
+from vedette.recorded.geography import Origin
+from vedette.recorded.rows import Row, Rows
 from vedette.recorded.scan_times import (
     RecordedScan,
     RecordedScans,
@@ -44,13 +27,12 @@ from vedette.recorded.scan_times import (
     group_by_time,
     poses_at_sites,
     remove_biases,
-    turned,
 )
-from vedette.recorded.tables import FARTHEST, LATEST, Table, is_empty, is_number, number, seconds
+from vedette.recorded.tables import Table
 from vedette.recorded.turns import bearings_of, scans_of_turns
 from vedette.simulation.records import ScansFile
 
-_OWN_POSE = ("own_x", "own_y", "own_lon", "own_lat", "own_heading")
+_LASTING, _ONE_PLACE = 5, 0.1  # fewest times at which wild rows are at one place, and its size, a share of the distance
 
 
 def parse_scans(
@@ -70,241 +52,39 @@ def parse_scans(
     Raises:
         InputError: names the file, row, column, and the expected and given values.
     """
-    rows = _Rows(table, sites, conventions, origin)
+    rows = Rows(table, sites, conventions, origin)
     readable, skipped = rows.read()
     if not readable:
         raise InputError(f"{table.source}: expected at least one row that can be read; got none of {len(table.rows)}")
-    readable, beyond = _without_wild(readable, table, sites)
-    recording = _at_instants(readable, rows, skipped + beyond)
-    notes = (*table.notes, *rows.without_velocity(recording.poses))
-    gathered, file = recording.gathered, ScansFile(Path(table.source).name, table.sha256)
+    marked = {row.sensor for row in readable if row.measured is None}
+    readable, beyond, lasting = _without_wild(readable, table, sites)
+    recording = _at_instants(readable, rows, skipped + beyond, marked)
+    notes = (*table.notes, *rows.notes, *lasting, *rows.without_velocity(recording.poses))
+    file, columns = ScansFile(Path(table.source).name, table.sha256), tuple(names or () for names in rows.accuracy)
     if any(site.bias != NO_BIAS for site in sites):
         recording = remove_biases(recording, sites)
-    columns = tuple(names or () for names in rows.accuracy)
-    return replace(recording, unused=rows.unused, notes=notes, file=file, gathered=gathered, accuracy_columns=columns)
-
-
-@dataclass(frozen=True, slots=True)
-class _Row:
-    index: int
-    time: float
-    sensor: int
-    measured: tuple[float, ...] | None
-    pose: tuple[float, ...]
-    accuracy: tuple[float, ...]
-
-
-class _Rows(ScanColumns):
-    """The rows of a table as scans."""
-
-    def read(self) -> tuple[list[_Row], tuple[str, ...]]:
-        """Return the rows that can be read, and the faults of the others."""
-        readable, skipped = list[_Row](), list[str]()
-        for i in range(len(self.table.rows)):
-            try:
-                readable.append(self._row(i))
-            except InputError as error:
-                if self.conventions.bad_rows == "refuse":
-                    raise
-                skipped.append(str(error))
-        return readable, tuple(skipped)
-
-    def _row(self, i: int) -> _Row:
-        s = self._site(i)
-        time, pose = self._seconds(i), self._pose(i, s)
-        accuracy = {name: self._accuracy_value(i, s, name) for name in self.accuracy[s] or ()}
-        return _Row(i, time, s, self._measured(i, s, pose, accuracy), pose, tuple(accuracy.values()))
-
-    def _site(self, i: int) -> int:
-        """Return the sensor of a row; without a column of sensors, the only one."""
-        if self._sensor is None:
-            return 0
-        label = str(self.table.columns[self._sensor][i]).strip()
-        if label not in self._numbers:
-            names = ", ".join(shown(site.name) for site in self.sites)
-            raise self.table.fault(i, self._sensor, f"a sensor among {names}, or its number from 1")
-        return self._numbers[label]
-
-    def _seconds(self, i: int) -> float:
-        """Return the time of a row, all as dates or all as numbers."""
-        cell = self.table.columns[self._time][i]
-        try:
-            time = seconds(cell)
-        except (TypeError, ValueError, OverflowError):
-            time = math.nan
-        if not abs(time) <= LATEST or is_number(cell) == self.is_utc:
-            number = (
-                f"a number of seconds from {-LATEST:g} to {LATEST:g}"
-                if abs(time) > LATEST
-                else "a finite number of seconds"
-            )
-            expected = "an ISO 8601 time" if self.is_utc else number
-            raise self.table.fault(i, self._time, expected)
-        return time
-
-    def _value(self, i: int, quantity: str) -> float:
-        name, unit = self._columns[quantity]
-        try:
-            value = unit * number(self.table.columns[name][i])
-        except (TypeError, ValueError, OverflowError):
-            value = math.nan
-        if not math.isfinite(value):
-            raise self.table.fault(i, name, "a finite number")
-        limit = MOST.get(quantity, FARTHEST)
-        over = OVER_A_TURN if UNITS[quantity] is ANGLES else 1e-9 * limit
-        least = max(-limit, QUANTITIES[quantity].least) if quantity in QUANTITIES else -limit
-        if not least - (over if least else 0.0) <= value <= limit + over:
-            limits = f"from {least / unit:g} to {limit / unit:g}"
-            raise self.table.fault(i, name, f"a number {limits}")
-        return value
-
-    def _angle(self, i: int, quantity: str, s: int, place: Sequence[float]) -> float:
-        """Return a bearing or heading of a sensor at a place, as an angle of the plane."""
-        return float(turned(self._value(i, quantity), self.bearings[s], self.compass, place))
-
-    def _measured(
-        self, i: int, s: int, pose: Sequence[float], accuracy: Mapping[str, float]
-    ) -> tuple[float, ...] | None:
-        """Return the measurement as filters take it; None for a scan without measurements."""
-        site = self.sites[s]
-        quantities: tuple[str, ...] = COMPONENTS[site.kind]
-        if is_position(site.kind) and "lon" in self._columns:
-            quantities = ("lon", "lat", *quantities[2:])
-        cells = [self.table.columns[self._columns[quantity][0]][i] for quantity in quantities]
-        if all(map(is_empty, cells)):
-            return None
-        if quantities[0] == "lon":
-            place = self._agreed(i, self._plane(i, "lon", "lat"), "x", "y")
-            measured = [*place, *(self._third(i, quantity) for quantity in quantities[2:])]
-        else:
-            measured = [
-                self._angle(i, quantity, s, pose) if quantity == "bearing" else self._third(i, quantity)
-                for quantity in quantities
-            ]
-        return (*measured, *self._row_noise(i, s, measured, pose, accuracy))
-
-    def _third(self, i: int, quantity: str) -> float:
-        """Return a measured value; of a third component that the row does not have, what stands in for it."""
-        return GAPS[quantity] if quantity in GAPS and self._is_blank(i, quantity) else self._value(i, quantity)
-
-    def _accuracy_value(self, i: int, s: int, name: str) -> float:
-        if self._is_blank(i, name):
-            return math.nan
-        if name == "class":
-            return self._report(i, s)
-        if name == "xy_correlation":
-            return self._correlation(i)
-        return self._value(i, name) if name in ("snr", "size") else self._std(i, name)
-
-    def _report(self, i: int, s: int) -> float:
-        """Return the index of the class that a row reports."""
-        features, column = self.sites[s].features, self._columns["class"][0]
-        assert features is not None  # else the column is not read
-        report = str(self.table.columns[column][i]).strip()
-        if report not in features.reports:
-            raise self.table.fault(i, column, f"one of {', '.join(map(shown, features.reports))}, or an empty cell")
-        return float(features.reports.index(report))
-
-    def _row_noise(
-        self, i: int, s: int, measured: Sequence[float], pose: Sequence[float], accuracy: Mapping[str, float]
-    ) -> tuple[float, ...]:
-        """Return covariance and log likelihood ratios of a row in the order of `row_noise`; () for rows without any."""
-        if self.accuracy[s] is None:
-            return ()
-        own, site = {name: value for name, value in accuracy.items() if not math.isnan(value)}, self.sites[s]
-        names = COMPONENTS[self.sites[s].kind]
-        missing = [name in GAPS and self._is_blank(i, name) for name in names]
-        stds = [own.get(f"{name}_std", 0.0) for name in names]
-        ratio = site.signal.log_likelihood_ratio(own["snr"]) if site.signal is not None and "snr" in own else 0.0
-        classes: Sequence[float] = ()
-        if site.features is not None:
-            report = int(own["class"]) if "class" in own else None
-            classes = site.features.log_ratios(report, own.get("size")).tolist()
-        of_pose = PoseStds(**{name: own.get(f"own_{name}_std", 0.0) for name in PoseStds._fields})
-        added = pose_noise(measured, names, pose, of_pose) if any(of_pose) else None
-        correlation = own.get("xy_correlation", 0.0)
-        return row_noise(
-            stds,
-            missing,
-            correlation=correlation,
-            log_likelihood_ratio=ratio,
-            added=added,
-            log_class_ratios=classes,
-        )
-
-    def _is_blank(self, i: int, quantity: str) -> bool:
-        return is_empty(self.table.columns[self._columns[quantity][0]][i])
-
-    def _std(self, i: int, quantity: str) -> float:
-        if (value := self._value(i, quantity)) <= 0.0:
-            raise self.table.fault(i, self._columns[quantity][0], "a standard deviation above 0, or an empty cell")
-        return value
-
-    def _correlation(self, i: int) -> float:
-        if abs(value := self._value(i, "xy_correlation")) >= 1.0:
-            raise self.table.fault(i, self._columns["xy_correlation"][0], "a correlation above -1 and below 1")
-        return value
-
-    def _pose(self, i: int, s: int) -> tuple[float, ...]:
-        """Return the pose of the sensor; the site gives what is not in the row."""
-        site = self.sites[s]
-        place: tuple[float, ...] = site.pose[:2]
-        if site.kind == "position" and all(self._is_blank(i, name) for name in _OWN_POSE if name in self._columns):
-            return tuple(site.pose)  # positions do not depend on it, and files of several sensors leave it empty
-        if {"own_lon", "own_lat"} <= set(self._columns):
-            place = self._agreed(i, self._plane(i, "own_lon", "own_lat"), "own_x", "own_y")
-        elif {"own_x", "own_y"} <= set(self._columns):
-            place = self._value(i, "own_x"), self._value(i, "own_y")
-        has_heading = "own_heading" in self._columns
-        heading = self._angle(i, "own_heading", s, place) if has_heading else site.pose[2]
-        pose = [*place, heading, *site.pose[3:]]
-        if is_doppler(site.kind) and {*OWN_SPEEDS} <= set(self._columns):
-            pose[OWN_VELOCITY : OWN_VELOCITY + 2] = (self._value(i, quantity) for quantity in OWN_SPEEDS)
-        if site.kind in HEIGHT_DEPENDENT and "own_height" in self._columns:
-            pose += [0.0] * (OWN_HEIGHT + 1 - len(pose))
-            pose[OWN_HEIGHT] = self._value(i, "own_height")
-        return tuple(pose)
-
-    def _agreed(self, i: int, place: tuple[float, ...], x: str, y: str) -> tuple[float, ...]:
-        """Return a place given in degrees; raises if the row has one in metres, too, that does not agree."""
-        if not {x, y} <= set(self._columns) or self._is_blank(i, x) or self._is_blank(i, y):
-            return place
-        apart = math.hypot(self._value(i, x) - place[0], self._value(i, y) - place[1])
-        if apart > ONE_PLACE + ONE_PLACE_SHARE * math.hypot(*place):
-            where = f"the place of its longitude and latitude ({place[0]:.0f}, {place[1]:.0f} m)"
-            raise self.table.fault(
-                i, self._columns[x][0], f"{x}, {y} at {where}, not {apart:.0f} m away, or one of both"
-            )
-        return place
-
-    def _plane(self, i: int, lon: str, lat: str) -> tuple[float, ...]:
-        assert self.origin is not None  # checked before
-        degrees = self._value(i, lon), self._value(i, lat)
-        if (place := self.origin.nearby(*degrees)) is None:
-            expected = f"with latitude {degrees[1]:g} a longitude within {PLANE_REACH / 1000.0:g} km of the origin"
-            raise self.table.fault(i, self._columns[lon][0], f"{expected} (are they exchanged?)")
-        return place
+    return replace(recording, unused=rows.unused, notes=notes, file=file, accuracy_columns=columns)
 
 
 def _without_wild(
-    rows: list[_Row], table: Table, sites: Sequence[RecordedSensor]
-) -> tuple[list[_Row], tuple[str, ...]]:
-    """Return the rows, wild ones first and without measurements, and the faults of the wild ones."""
+    rows: list[Row], table: Table, sites: Sequence[RecordedSensor]
+) -> tuple[list[Row], tuple[str, ...], tuple[str, ...]]:
+    """Return the rows, wild ones first and without measurements, the faults of the wild ones, and warnings of them."""
     placed = [i for i, row in enumerate(rows) if row.measured is not None and sites[row.sensor].kind in PLACED]
     if not placed:
-        return rows, ()
+        return rows, (), ()
     placed_rows = [rows[i] for i in placed]
     sensor_places = np.array([row.pose[:2] for row in placed_rows])
-    measured = [np.array([row.measured]) for row in placed_rows]
     places = np.concatenate(
         [
-            places_of(scan, at, sites[row.sensor].kind)
-            for scan, at, row in zip(measured, sensor_places, placed_rows, strict=True)
+            places_of(_scan([row], sites[row.sensor]), np.array(row.pose[:2]), sites[row.sensor].kind)
+            for row in placed_rows
         ]
     )
     reaches = np.array([sites[row.sensor].reach for row in placed_rows])
-    is_wild = wild(np.array([row.time for row in placed_rows]), places, sensor_places, reaches)
-    texts, emptied = list[str](), dict[int, _Row]()
+    times, sensors = np.array([row.time for row in placed_rows]), np.array([row.sensor for row in placed_rows])
+    is_wild = wild(times, places, sensor_places, reaches)
+    texts, emptied = list[str](), dict[int, Row]()
     for j in np.flatnonzero(is_wild).tolist():
         row, away = placed_rows[j], float(np.hypot(*(places[j] - sensor_places[j])))
         reach = sites[row.sensor].reach
@@ -312,12 +92,29 @@ def _without_wild(
         expected = f"a measurement of {shown(sites[row.sensor].name)} {why}"
         texts.append(f"{table.source}, row {table.rows[row.index]}: expected {expected}; got one {away:.0f} m away")
         emptied[placed[j]] = replace(row, measured=None)
-    return [*emptied.values(), *(row for i, row in enumerate(rows) if i not in emptied)], tuple(texts)
+    lasting, off = list[str](), places - sensor_places
+    for s in set(sensors[is_wild].tolist()):
+        own = is_wild & (sensors == s)
+        lasting += _lasting(sites[s].name, times[own], off[own])
+    return [*emptied.values(), *(row for i, row in enumerate(rows) if i not in emptied)], tuple(texts), tuple(lasting)
 
 
-def _at_instants(rows: list[_Row], how: _Rows, skipped: tuple[str, ...]) -> RecordedScans:
-    """Return rows with one sensor and time as scans, scans with one time as instants."""
-    looks, sites, window = [], how.sites, how.conventions.scan_window
+def _lasting(name: str, times: Floats, off: Floats) -> Iterator[str]:
+    """Yield a warning of wild rows that stay at one place, perhaps a target. off: (num, 2) m from the sensor."""
+    middle = np.median(off, axis=0)
+    stay = times[np.hypot(*(off - middle).T) <= _ONE_PLACE * np.hypot(*middle)]
+    if len(np.unique(stay)) >= _LASTING:
+        where = f"about {np.hypot(*middle):.0f} m away between t = {stay.min():g} and {stay.max():g} s"
+        cure = "if they are of a target, give the sensor a `detection` with a max_range beyond it"
+        yield f"{name}: {pluralise(len(stay), 'row')} left out, far beyond all others but {where}: {cure}"
+
+
+def _at_instants(rows: list[Row], how: Rows, skipped: tuple[str, ...], marked: set[int]) -> RecordedScans:
+    """Return rows with one sensor and time as scans, scans with one time as instants.
+
+    marked: sensors with rows of empty cells; they have no other empty scans.
+    """
+    looks, sites, window, texts = list[RecordedScan](), how.sites, how.conventions.scan_window, dict[str, str]()
     spans = [0.0] * len(sites)
     for s, site in enumerate(sites):
         own = sorted((row for row in rows if row.sensor == s), key=lambda row: row.time)
@@ -328,15 +125,42 @@ def _at_instants(rows: list[_Row], how: _Rows, skipped: tuple[str, ...]) -> Reco
         groups = _groups(own, window)
         if several := [group[-1].time - group[0].time for group in groups if len(group) > 1]:
             spans[s] = float(np.median(several))
+        with_rows = list[RecordedScan]()
         for group in groups:
             time = math.fsum(row.time for row in group) / len(group) if window > 0.0 else group[0].time
             pose = np.array(group[-1].pose)
-            looks.append(RecordedScan(time, s, _scan(group, site), pose, _accuracy(group, how.accuracy[s])))
+            with_rows.append(RecordedScan(time, s, _scan(group, site), pose, _accuracy(group, how.accuracy[s])))
+        looks += with_rows
+        if with_rows and how.conventions.empty_scans == "found" and s not in marked:
+            empty, texts[site.name] = _without_rows(with_rows, site)
+            looks += empty
     recording = group_by_time(looks, poses_at_sites(sites, looks), 0.0, how.is_utc, skipped, how.bearings)
-    return replace(recording, gathered=tuple(spans))
+    empty_texts = tuple(f"{name} {text}" for name, text in texts.items() if text)
+    return replace(recording, gathered=tuple(spans), empty=empty_texts)
 
 
-def _looks_of_turns(rows: list[_Row], sensor: int, how: _Rows) -> list[RecordedScan] | None:
+def _without_rows(scans: list[RecordedScan], site: RecordedSensor) -> tuple[list[RecordedScan], str]:
+    """Return the scans between those with rows that have none, and a description; nothing without a period."""
+    is_placed, dim = site.kind in PLACED, len(COMPONENTS[site.kind])
+    places = [
+        places_of(look.scan, look.pose, site.kind) if is_placed else measured_part(look.scan, dim) for look in scans
+    ]
+    of_rows = np.repeat(np.arange(len(scans)), [len(each) for each in places])
+    found = empty_scans(np.array([look.time for look in scans]), np.concatenate(places), of_rows)
+    if found is None:
+        return [], ""
+    looks = list[RecordedScan]()
+    times, before_scans, text = found
+    for time, k in zip(times.tolist(), before_scans.tolist(), strict=True):
+        before, after = scans[k], scans[k + 1]
+        pose = before.pose.copy()
+        pose[:2] += (after.pose[:2] - pose[:2]) * (time - before.time) / (after.time - before.time)
+        accuracy = None if before.accuracy is None else before.accuracy[:0]
+        looks.append(before._replace(time=time, scan=before.scan[:0], pose=pose, accuracy=accuracy))
+    return looks, text
+
+
+def _looks_of_turns(rows: list[Row], sensor: int, how: Rows) -> list[RecordedScan] | None:
     """Return the scans of a turning radar; None without a turn."""
     own, site = [row for row in rows if row.measured is not None], how.sites[sensor]
     if not own:
@@ -352,23 +176,22 @@ def _looks_of_turns(rows: list[_Row], sensor: int, how: _Rows) -> list[RecordedS
     ]
 
 
-def _groups(rows: list[_Row], window: float) -> list[list[_Row]]:
-    groups: list[list[_Row]] = []
+def _groups(rows: list[Row], window: float) -> list[list[Row]]:
+    groups: list[list[Row]] = []
     for row in rows:
-        if groups and row.time - groups[-1][0].time <= window:
-            groups[-1].append(row)
-        else:
-            groups.append([row])
+        if not groups or row.time - groups[-1][0].time > window:
+            groups.append([])
+        groups[-1].append(row)
     return groups
 
 
-def _scan(rows: list[_Row], site: RecordedSensor) -> Floats:
+def _scan(rows: list[Row], site: RecordedSensor) -> Floats:
     measured = [row.measured for row in rows if row.measured is not None]
     length = len(measured[0]) if measured else len(COMPONENTS[site.kind])
     return np.array(measured, np.float64).reshape(len(measured), length)
 
 
-def _accuracy(rows: list[_Row], columns: Sequence[str] | None) -> Floats | None:
+def _accuracy(rows: list[Row], columns: Sequence[str] | None) -> Floats | None:
     """Return the columns of accuracy of the rows with a measurement, see `RecordedScans`."""
     if not columns:
         return None

@@ -19,6 +19,9 @@ from vedette.recorded.turns import RadarService
 # Beyond these values, differences and speeds of reports are meaningless.
 FARTHEST = 1e9  # m, m/s
 LATEST = 1e12  # s
+DAY = 86_400.0  # s
+TIMES = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}  # units of times
+_IN_ORDER = 60.0  # s; largest step back of rows in order of time
 _MOST_NAMES = 20
 
 
@@ -66,10 +69,11 @@ class Table:
         return values
 
     def times(self, name: str) -> Floats:
-        """Return a column of times as seconds; its cells are numbers or ISO 8601 times, as most of them are."""
+        """Return a column as seconds: numbers, in the unit at the end of its name, or ISO 8601, as most cells are."""
         cells = self.column(name)
         if not are_dates(cells):
-            return self.numbers(name, LATEST)
+            unit = TIMES.get(name.rpartition("_")[2], 1.0)
+            return across_midnight(unit * self.numbers(name, LATEST / unit))
         values = np.empty(len(cells))
         for i, cell in enumerate(cells):
             try:
@@ -86,6 +90,19 @@ class Table:
         if "" in labels:
             raise self.fault(labels.index(""), name, "a name or number")
         return labels
+
+
+def across_midnight(times: Floats) -> Floats:
+    """Return seconds of the day that pass midnight as times that increase over it; other times unchanged.
+
+    times: (num,) s, in the order of rows, which must be that of time if they span more than half a day.
+    """
+    if not len(times) or times.min() < 0.0 or times.max() > DAY or np.ptp(times) <= 0.5 * DAY:
+        return times
+    steady = np.unwrap(times, period=DAY)
+    if np.ptp(steady) > 0.5 * DAY and np.diff(steady).min() < -_IN_ORDER:
+        return times
+    return np.asarray(steady - DAY * np.floor(steady.min() / DAY))
 
 
 def as_table(frame: Any, source: str = "table") -> Table:

@@ -17,9 +17,11 @@ from vedette.recorded import RecordedScans
 from vedette.scenarios.assumed_clutter import assumed_clutter, place_stds
 from vedette.scenarios.region import describe_region, measured_region
 from vedette.scenarios.sections import ScenarioModel
+from vedette.scenarios.sections.undetected import has_intensity
 from vedette.scenarios.sensors_file import EXPECTED_BIRTHS, HEIGHT_STD, measured_birth, measures_heights
 
 _LOST_PER_SECOND = 0.001
+_SLOW = 10.0  # s between scans, from which on times may be in another unit than seconds
 _BIRTH_STDS = 2.0  # times the upper quartile of the noise of measured places
 
 
@@ -38,25 +40,36 @@ def assumed_sections(
     if "region" not in given:
         assumed["region"] = region = measured_region(model, recording)
         descriptions["region"] = f"{describe_region(region)} (box around all measurements and sensors)"
+    if "motion" not in given:
+        _check_period(period, assumed.get("region") or model.region.model_dump(), speed)
     assumed |= assumed_motion(given, speed, descriptions)
     if "birth" not in given:
         measured = [
             [scan for scans in recording.scans if (scan := scans[s]) is not None and len(scan)]
             for s in range(len(model.sensors))
         ]
-        assumed |= assumed_birth(model, measured, folder, speed, descriptions)
+        assumed |= assumed_birth(model, measured, folder, speed, descriptions, learnt=has_intensity(model))
     if turns := _turns(model, recording):
         descriptions["turn"] = turns
+    if recording.empty:
+        descriptions["scans"] = f"{'; '.join(recording.empty)} (recording: {{empty_scans: none}}: only those with rows)"
     return assumed | assumed_clutter(given, model, recording, folder, speed, descriptions)
+
+
+def _check_period(period: float, region: Mapping[str, Any], speed: float) -> None:
+    """Raise `InputError` if targets could cross the region between two scans, as with times in another unit."""
+    diagonal = math.hypot(region["x_max"] - region["x_min"], region["y_max"] - region["y_min"])
+    if period >= _SLOW and speed * period > diagonal:
+        expected = f"scans less than {diagonal / speed:.3g} s apart, in which targets of {speed:g} m/s cross the region"
+        cure = "give `recording: {units: {time: ms}}` for times in milliseconds (us, ns), or a lower --max-target-speed"
+        raise InputError(f"recording: expected {expected}; got {period:.6g} s (median): {cure}")
 
 
 def _turns(model: ScenarioModel, recording: RecordedScans) -> str:
     """Describe the turns that were found from the rows and not given; empty if there are none."""
     texts = []
     for s, (name, sensor) in enumerate(zip(model.sensor_names, model.sensors, strict=True)):
-        sensor_poses = [
-            poses[s] for scans, poses in zip(recording.scans, recording.poses, strict=True) if scans[s] is not None
-        ]
+        sensor_poses = [poses[s] for k, poses in enumerate(recording.poses) if recording.scans[k][s] is not None]
         rates = [pose[BEAM + 1] for pose in sensor_poses if is_turn(pose)]
         if sensor.turn is None and rates:
             rate = float(np.median(rates))
@@ -91,14 +104,17 @@ def assumed_birth(
     folder: FilePath,
     speed: float,
     descriptions: dict[str, str],
+    learnt: bool = False,
 ) -> dict[str, Any]:
-    """Return births from measurements; measured: the scans of each sensor."""
+    """Return births from measurements. measured: the scans of each sensor; learnt: True to learn their rate."""
     std = _BIRTH_STDS * _place_std(model, measured, folder)
-    descriptions["birth"] = (
-        f"{EXPECTED_BIRTHS:g} new targets per scan, from measurements that no track explains "
-        f"(std {std:.3g} m, {speed:g} m/s)"
-    )
-    return {"birth": measured_birth(std, speed, model.motion.state_dim, model.has_heights)}
+    section = measured_birth(std, speed, model.motion.state_dim, model.has_heights)
+    rate = f"{EXPECTED_BIRTHS:g} new targets per scan"
+    if learnt:
+        section["from_measurements"]["expected"] = "learnt"
+        rate = "new targets at a rate learnt from the scans"
+    descriptions["birth"] = f"{rate}, from measurements that no track explains (std {std:.3g} m, {speed:g} m/s)"
+    return {"birth": section}
 
 
 def _place_std(model: ScenarioModel, measured: Sequence[Sequence[Floats]], folder: FilePath) -> float:

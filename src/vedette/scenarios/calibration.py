@@ -26,6 +26,7 @@ from vedette.scenarios.sections.base import GaussianMethod
 from vedette.scenarios.sections.recording import recorded_sensors
 from vedette.scenarios.sections.sensing import Clutter
 from vedette.scenarios.sections.sensors import Sensor
+from vedette.scenarios.sensors_file import EXPECTED_BIRTHS
 from vedette.scenarios.yaml_reader import MAX_BYTES, read_yaml
 from vedette.tracking import Central, Tracker
 
@@ -110,14 +111,20 @@ def _smooth(method: GaussianMethod, kind: str) -> GaussianMethod:
 def _births_per_scan(targets: TargetModel, times: Floats) -> TargetModel:
     """Return the targets with the expected births of an average scan interval at every scan, whenever it comes.
 
-    Births that count per period become more the later a scan comes, which would make later clocks more likely.
+    A learnt number is replaced by `EXPECTED_BIRTHS`. Births that count per period become more the later a scan comes,
+    which would make later clocks more likely.
     """
     birth = targets.birth
     measured = birth.from_measurements
-    if birth.period is None or measured is None or isinstance(measured.expected, str) or len(times) < 2:
+    if measured is None:
         return targets
-    share = float(times[-1] - times[0]) / (len(times) - 1) / birth.period
-    measured = replace(measured, expected=share * measured.expected)
+    if isinstance(measured.expected, str):  # a rate that is learnt would change with the parameters
+        measured = replace(measured, expected=EXPECTED_BIRTHS)
+    elif birth.period is None or len(times) < 2:
+        return targets
+    else:
+        share = float(times[-1] - times[0]) / (len(times) - 1) / birth.period
+        measured = replace(measured, expected=share * measured.expected)
     return replace(targets, birth=replace(birth, period=None, from_measurements=measured))
 
 

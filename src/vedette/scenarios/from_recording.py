@@ -14,12 +14,7 @@ from vedette.recorded import Conventions, RecordedScans
 from vedette.scenarios.assumptions import assumed_birth, assumed_motion, assumed_sections
 from vedette.scenarios.loading import Scenario
 from vedette.scenarios.region import describe_region, reached_region
-from vedette.scenarios.sensors_file import (
-    MAX_STEPS,
-    placeholder_sections,
-    read_sensors_file,
-    validated_model,
-)
+from vedette.scenarios.sensors_file import MAX_STEPS, placeholder_sections, read_sensors_file, validated_model
 
 _MAX_HORIZON_STEPS = 100  # steps of a horizon
 

@@ -6,10 +6,11 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from vedette.internal.quantities import PLACED
+from vedette.internal.quantities import COMPONENTS, PLACED
 from vedette.internal.text import pluralise
 from vedette.recorded import RecordedScans
 from vedette.recorded import RecordedTargets as RecordedSource
+from vedette.recorded.cleaning import longest_reachable
 from vedette.recorded.tables import column_names
 from vedette.scenarios.diagnostics import Path, format_path
 from vedette.scenarios.loading import Scenario
@@ -20,6 +21,7 @@ from vedette.scenarios.sections.sensors import Sensor
 from vedette.scenarios.sections.targets import RecordedTargets
 from vedette.scenarios.sections.world import Time
 
+_JUMP = 5.0  # times the speed of nine in ten steps between reports, above which a report is a jump
 _MIN_DISTANCE = 1000.0  # m; sensors nearer than this to the targets are not called far
 
 
@@ -32,11 +34,14 @@ def recording_warnings(scenario: Scenario) -> Iterator[tuple[Path, str]]:
         yield from ((("recording", "path"), note) for note in recording.notes)
         yield from beyond_region_warnings(model, recording)
         yield from _large_scan_window(model, recording)
+        yield from _noise_beyond_ranges(model, recording)
     if not isinstance(model.targets, RecordedTargets):
         return
     source = model.targets.source(model, folder)
     yield from _repeated_reports(model.targets, source)
     yield from _single_reports(model.targets, source)
+    if source.cleaning.max_speed is None:
+        yield from _jumps(model.targets, source)
     yield from _unused_columns(("targets", "path"), model.targets.path, source.reports.unused)
     yield from ((("targets", "path"), f"targets.path: {model.targets.path}: {note}") for note in source.reports.notes)
     for index, sensor in enumerate(model.sensors):
@@ -81,6 +86,38 @@ def _large_scan_window(model: ScenarioModel, recording: RecordedScans) -> Iterat
             f"{speed:g} m/s moves {speed * window:.3g} m, more than the noise ({stds[1]:.3g} m): if it is a turning "
             "radar, give the sensor `turn: {period: ...}`; else use a smaller `scan_window`",
         )
+
+
+def _noise_beyond_ranges(model: ScenarioModel, recording: RecordedScans) -> Iterator[tuple[Path, str]]:
+    """Yield warnings of noise of a range that is larger than the range itself, at the median of its measurements."""
+    for s, sensor in enumerate(model.sensors):
+        scans = [scan for instant in recording.scans if (scan := instant[s]) is not None and len(scan)]
+        names, stds = COMPONENTS.get(sensor.measurement.kind, ()), noise_stds(sensor)
+        if "range" not in names or stds is None or not scans:
+            continue
+        away, what = float(np.median(np.concatenate(scans)[:, (axis := names.index("range"))])), "noise"
+        std = stds[axis] + getattr(sensor.noise, "eta_range", 0.0) * away**2
+        if "range_std" in (columns := recording.accuracy_columns[s] if recording.accuracy_columns else ()):
+            cells = [own[:, columns.index("range_std")] for each in recording.accuracy if (own := each[s]) is not None]
+            std, what = float(np.nanmedian([std, *np.concatenate(cells)])), "column range_std"
+        if std > away:
+            text = f"expected noise of ranges below the ranges, {away:.0f} m (median); got {std:.3g} m"
+            yield ("sensors", s, "noise"), f"{model.sensor_names[s]}, {what}: {text} (is its unit right?)"
+
+
+def _jumps(section: RecordedTargets, source: RecordedSource) -> Iterator[tuple[Path, str]]:
+    """Yield a warning of reports that no speed of the others reaches."""
+    reports = source.reports
+    rows = [np.flatnonzero(reports.tracks == i) for i in range(len(reports.names))]
+    paths = [(reports.times[own], reports.positions[own]) for own in rows]
+    speeds = [np.hypot(*np.diff(places, axis=0).T) / np.diff(times) for times, places in paths]
+    limit = max(_JUMP * float(np.quantile(np.concatenate(speeds), 0.9)), 1.0)
+    jumping = [i for i, own in enumerate(speeds) if (own > limit).any()]
+    lost = {reports.names[i]: len(rows[i]) - len(longest_reachable(*paths[i], limit)) for i in jumping}
+    if num := sum(lost.values()):
+        finding = f"{pluralise(num, 'report')} of {column_names(lost)} reached only above {limit:.3g} m/s"
+        cure = f"the error counts {'it' if num == 1 else 'them'}; `targets: {{max_speed: {limit:.3g}}}` leaves such out"
+        yield ("targets", "path"), f"targets.path: {section.path}: {finding}, {_JUMP:g} times most speeds: {cure}"
 
 
 def _repeated_reports(section: RecordedTargets, source: RecordedSource) -> Iterator[tuple[Path, str]]:

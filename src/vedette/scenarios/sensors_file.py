@@ -11,9 +11,10 @@ from vedette.errors import InputError, ScenarioError
 from vedette.internal.quantities import COMPONENTS, HEIGHT_DEPENDENT
 from vedette.internal.reading import read_text
 from vedette.internal.text import pluralise
-from vedette.scenarios.diagnostics import Fault, describe
+from vedette.scenarios.diagnostics import Diagnostic, Fault, describe
 from vedette.scenarios.loading import diagnose, locate_fault
 from vedette.scenarios.sections import ScenarioModel
+from vedette.scenarios.sections.courses import headings_beside_north
 from vedette.scenarios.sections.recording import RecordingSection
 from vedette.scenarios.sections.world import STATE_DIMS
 from vedette.scenarios.validation import read_section
@@ -129,10 +130,14 @@ def _not_given(given: Mapping[str, Any]) -> tuple[str, ...]:
 
 
 def read_sensors_file(sensors: FilePath) -> Document:
-    """Read a sensors file; raises `InputError` if it is not a mapping."""
+    """Read a sensors file; raises `InputError` if it is no mapping, or has `heading_deg` but counts from north."""
     document = read_yaml(read_text(sensors, "sensors file", MAX_BYTES), str(sensors))
     if not isinstance(document.data, Mapping):
         raise InputError(f"{sensors}: expected a mapping with `sensors`; got {describe(document.data)}")
+    if "time" not in document.data and (paths := headings_beside_north(document.data)):
+        wanted = "course_deg, clockwise from true north, as bearings in this file"
+        faults = (Diagnostic(path, wanted, "heading_deg, which counts from east") for path in paths)
+        raise ScenarioError([locate_fault(document, each).message(str(sensors)) for each in faults])
     return document
 
 

@@ -31,18 +31,12 @@ def courses_to_headings(data: Mapping[str, Any]) -> Mapping[str, Any]:
     ones.
     """
     sensors, defaults = data.get("sensors"), data.get("sensor_defaults")
-    parts = [part for part in (defaults, *(sensors if isinstance(sensors, list | tuple) else ())) if _is_mapping(part)]
-    keys = {key for part in parts for key in _keys(part)}
-    if not keys & set(COURSE_KEYS) or keys & _HEADING_KEYS:
-        return data
-    origin = read_origin(data)
-    recording = data.get("recording")
-    counts_from_north = _is_mapping(recording) and recording.get("bearings") == "north"
-    if origin is None and not counts_from_north and not any(part.get("compass") is True for part in parts):
+    keys = {key for part in _parts(data).values() for key in _keys(part)}
+    if not keys & set(COURSE_KEYS) or keys & _HEADING_KEYS or not _counts_from_north(data):
         return data
     from vedette.platforms.compass import PlaneCompass
 
-    compass, shared_settings = origin or PlaneCompass(), defaults if _is_mapping(defaults) else {}
+    compass, shared_settings = read_origin(data) or PlaneCompass(), defaults if _is_mapping(defaults) else {}
     inherited = {key: shared_settings[key] for key in ("course_deg", "platform") if key in shared_settings}
     converted = {**data}
     if isinstance(sensors, list | tuple):
@@ -50,6 +44,28 @@ def courses_to_headings(data: Mapping[str, Any]) -> Mapping[str, Any]:
             _sensor({**inherited, **sensor}, compass) if _is_mapping(sensor) else sensor for sensor in sensors
         ]
     return {**converted, "sensor_defaults": _sensor(shared_settings, compass)} if shared_settings else converted
+
+
+def headings_beside_north(data: Mapping[str, Any]) -> list[Path]:
+    """Return the paths of `heading_deg` of sensors, which counts from east, in data whose directions are courses."""
+    paths: list[Path] = [(*path, "heading_deg") for path, part in _parts(data).items() if "heading_deg" in part]
+    return paths if _counts_from_north(data) else []
+
+
+def _parts(data: Mapping[str, Any]) -> dict[Path, Mapping[str, Any]]:
+    """Return the shared settings and the sensors by their paths, as far as they are mappings."""
+    sensors, defaults = data.get("sensors"), data.get("sensor_defaults")
+    parts: dict[Path, Any] = {("sensor_defaults",): defaults}
+    parts |= {("sensors", i): each for i, each in enumerate(sensors if isinstance(sensors, list | tuple) else ())}
+    return {path: part for path, part in parts.items() if _is_mapping(part)}
+
+
+def _counts_from_north(data: Mapping[str, Any]) -> bool:
+    """Return True for data with an origin, recorded bearings from north or a compass."""
+    recording = data.get("recording")
+    if read_origin(data) is not None or (_is_mapping(recording) and recording.get("bearings") == "north"):
+        return True
+    return any(part.get("compass") is True for part in _parts(data).values())
 
 
 def directions_as_courses(platform: Section, compass: Compass, place: Any) -> dict[str, tuple[str, Any]]:

@@ -69,6 +69,11 @@ class RecordingSection(Section):
         description="Whether sensors without `extent` get the extent that their scans show where targets give several "
         "returns; a scan then has one measurement a target, with the mean of its returns and their spread [-].",
     )
+    empty_scans: Literal["found", "none"] = Field(
+        default="found",
+        description="Whether a scan of a sensor with a regular period is taken for empty where it has no row; not for "
+        "sensors with rows of empty cells, in gaps that are outages, or where rows come by target [-].",
+    )
     bad_rows: Literal["refuse", "skip"] = Field(
         default="refuse", description="Whether a row that cannot be read is an error, or left out and told of [-]."
     )
@@ -109,7 +114,7 @@ def _read(
     from vedette.recorded.returns import extents_of
 
     own = RecordingSection.model_validate_json(section)
-    conventions = Conventions(own.columns, own.units, own.bearings, own.scan_window, own.bad_rows)
+    conventions = Conventions(own.columns, own.units, own.bearings, own.scan_window, own.bad_rows, own.empty_scans)
     recording = parse_scans(read_table(file, sha256=own.sha256), sites, conventions, origin)
     return merged(recording, sites, extents_of(recording, sites, returns))
 
