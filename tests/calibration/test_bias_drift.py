@@ -34,7 +34,9 @@ def problem(tmp_path_factory: pytest.TempPathFactory) -> Problem:
     folder = tmp_path_factory.mktemp("drifting")
     write_recording(folder, seconds=240.0, biases=BIASES, drift=DRIFT)
     (folder / "radars.yaml").write_text(SENSORS + MOTION, "utf-8")
-    return build_problem(scenario_from_recording(folder / "radars.yaml", folder / "scans.csv").scenario)
+    return build_problem(
+        scenario_from_recording(folder / "radars.yaml", folder / "scans.csv").scenario, prior_scale=10.0
+    )
 
 
 def place(problem: Problem, sensor: int, name: str) -> int:

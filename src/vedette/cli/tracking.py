@@ -16,7 +16,7 @@ from vedette.cli.options import BAD_ROWS, BadRows, Overwrite, ScansFile, Sensors
 from vedette.cli.output import bar, echo, emit_json, note
 from vedette.cli.run_summary import print_run
 from vedette.cli.running import CodeTrust, end_stopped, interruptible
-from vedette.cli.scenario_files import note_assumptions, print_warnings
+from vedette.cli.scenario_files import note_assumptions, print_warnings, write_text
 from vedette.internal.extras import without
 from vedette.internal.text import pluralise
 
@@ -54,6 +54,14 @@ JoinTracks = Annotated[
     bool, typer.Option("--join/--no-join", help="Join tracks across gaps, where they are probably of one target.")
 ]
 
+Calibrate = Annotated[
+    bool,
+    typer.Option(
+        "--calibrate",
+        help="First estimate what the sensors file does not give or the fit finds wrong; see `vedette calibrate`.",
+    ),
+]
+
 
 def track(
     scans: ScansFile,
@@ -63,6 +71,7 @@ def track(
     overwrite: Overwrite = False,
     formats: Formats = None,
     join: JoinTracks = True,
+    calibrate: Calibrate = False,
     speed: Speed = 10.0,
     bad_rows: BadRows = "refuse",
     trust: Trust = False,
@@ -72,28 +81,38 @@ def track(
     Prints tracks and diagnostics, and errors if the targets' own reports are given. --out writes tracks, tables and
     figures.
     """
+    from vedette.cli.calibrating import calibrate_doubtful
     from vedette.evaluation.fit import fit_of_run
 
     _check_output(formats or (), out, overwrite)
     recorded, warnings = read_recording(sensors, scans, truth, speed=speed, bad_rows=bad_rows, trust=trust)
     scenario, recording, assumed = recorded
-    if "clutter" in assumed:
-        note("`vedette calibrate` estimates clutter, noise and detection from the same scans.")
+    if "clutter" in assumed and not calibrate:
+        note("`--calibrate` estimates clutter, noise and detection from the same scans.")
     on_earth = [name for name in formats or () if name in ON_EARTH]
     if on_earth and scenario.model.origin is None:  # before a folder with only a part of the output exists
         raise usage_error(f"expected an origin in {sensors}, as {on_earth[0]} has degrees; got none", "--format")
     written: list[Path] = []
     with interruptible("nothing was written"):
         record = _run_tracker(scenario, recording)
-        fit = fit_of_run(record, scenario)
+        fit, text, calibration = fit_of_run(record, scenario), None, None
+        if calibrate and (found := calibrate_doubtful(recorded, fit, sensors)):
+            text, calibration = found
+            recorded = _with_sensors(text, scans, truth, speed, bad_rows)
+            scenario, recording, assumed = recorded
+            record = _run_tracker(scenario, recording)
+            fit = fit_of_run(record, scenario)
         print_run(record, scenario, fit, len(warnings))
         joins = _print_tracks(record, recorded, scans, join)
         if out is not None:
             written = _save(record, scenario, fit, out, formats, joins, overwrite=overwrite)
+            if text is not None:
+                write_text(out / "sensors.yaml", text)
+                written.append(out / "sensors.yaml")
     if out is not None:
         _draw(record, scenario, out)
         echo(f"Wrote {out}: {', '.join(_contents(out, written))}")
-    origin = {"assumptions": assumed, "skipped": recording.skipped, "warnings": warnings}
+    origin = {"assumptions": assumed, "skipped": recording.skipped, "warnings": warnings, "calibration": calibration}
     joined = [join._asdict() for join in joins]
     emit_json({**run_document(record, scenario, fit), **origin, "joins": joined, "folder": out, "written": written})
 
@@ -169,6 +188,17 @@ def read_recording(
         note(f"skipped: {len(recorded.recording.skipped) - _SHOWN_ROWS} more rows")
     note_assumptions(recorded.assumed, sensors)
     return recorded, warnings
+
+
+def _with_sensors(text: str, scans: Path, truth: Path | None, speed: float, bad_rows: str) -> RecordingScenario:
+    """Return the scenario of a recording with a sensors file of this text."""
+    from tempfile import TemporaryDirectory
+
+    from vedette.scenarios.from_recording import scenario_from_recording
+
+    with TemporaryDirectory() as folder:
+        (file := Path(folder) / "sensors.yaml").write_text(text, "utf-8")
+        return scenario_from_recording(file, scans, truth, speed=speed, bad_rows=bad_rows)
 
 
 def _contents(out: Path, written: list[Path]) -> list[str]:
