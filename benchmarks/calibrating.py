@@ -150,7 +150,7 @@ def redraw(
     def progress() -> None:
         passes[0] += 1
 
-    calibration = calibrate(build_problem(scenario, position=position), progress)
+    calibration = calibrate(build_problem(scenario, position=position, prior_scale=10.0), progress)
     spent = time.process_time() - begun
     text = calibrated_text(scenario, folder / "told.yaml", calibration, folder)
     (folder / "found.yaml").write_text(text, "utf-8")

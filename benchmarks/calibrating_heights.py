@@ -80,7 +80,7 @@ def calibrated(seed: int, kind: str, num_radars: int) -> Calibration:
     with tempfile.TemporaryDirectory() as place:
         write(Path(place), np.random.default_rng([seed, SCENES.index((kind, num_radars))]), kind, num_radars)
         scenario = scenario_from_recording(Path(place) / "radars.yaml", Path(place) / "scans.csv", speed=250.0)
-        return calibrate(build_problem(scenario.scenario))
+        return calibrate(build_problem(scenario.scenario, prior_scale=10.0))
 
 
 def truth_of(kind: str, name: str, sensor: int) -> float:

@@ -119,7 +119,7 @@ def row(name: str, runs: int, first: int) -> str:
         with tempfile.TemporaryDirectory() as place:
             write_recording(Path(place), arrangement, np.random.default_rng([seed, arrangement.stream]))
             scenario = scenario_from_recording(Path(place) / "radars.yaml", Path(place) / "scans.csv", speed=15.0)
-            calibration = calibrate(build_problem(scenario.scenario))
+            calibration = calibrate(build_problem(scenario.scenario, prior_scale=10.0))
         for each in calibration.estimates:
             truth = TRUTH[each.parameter.name]
             if math.isnan(each.ci_low):

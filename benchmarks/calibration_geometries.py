@@ -101,7 +101,7 @@ def redraw(name: str, seed: int) -> tuple[Calibration, dict[tuple[int, str], flo
         folder, rng = Path(place), np.random.default_rng([seed, list(GEOMETRIES).index(name)])
         truth = write_scans(folder, GEOMETRIES[name], rng)
         scenario = scenario_from_recording(folder / "radars.yaml", folder / "scans.csv", speed=8.0).scenario
-        return calibrate(build_problem(scenario)), truth
+        return calibrate(build_problem(scenario, prior_scale=10.0)), truth
 
 
 def lines(redraws: int) -> Iterator[str]:

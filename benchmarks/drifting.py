@@ -71,7 +71,7 @@ def redraw(folder: Path, scene: Scene, seconds: float, seed: int, first: float, 
     ships = write_scans(folder, scene, seconds, seed, drifts=DRIFTS)
     told = scenario_from_recording(folder / "told.yaml", folder / "scans.csv", speed=scene.speed).scenario
     true = scenario_from_recording(folder / "true.yaml", folder / "scans.csv", speed=scene.speed).scenario
-    problem, tracking = build_problem(told), build_tracking(true)
+    problem, tracking = build_problem(told, prior_scale=10.0), build_tracking(true)
     at_first = calibrate(replace(problem, recording=problem.recording.between(0.0, first)))
     problem = warm_started(problem, at_first)
     once = problem.with_biases(np.array([each.start for each in problem.parameters]))

@@ -69,7 +69,7 @@ def truth(parameter: Parameter) -> float:
 @pytest.mark.parametrize("kind", KINDS)
 def test_biases_of_two_radars_are_estimated(tmp_path: Path, kind: str) -> None:
     scenario = recorded(tmp_path, kind).scenario
-    problem = build_problem(scenario)
+    problem = build_problem(scenario, prior_scale=10.0)
     calibration = calibrate(problem, only=[each for each in problem.parameters if each.kind == "bias"])
     assert calibration.converged
     assert {each.parameter.component for each in calibration.estimates} == {*COMPONENTS[kind], "clock"}
@@ -101,7 +101,7 @@ def test_noise_detection_and_clutter_of_one_radar_are_estimated_and_its_biases_a
         return match_measurements(*args)  # type: ignore[arg-type]
 
     monkeypatch.setattr("vedette.calibration.calibrating.match_measurements", counted)
-    problem = build_problem(recorded(tmp_path, kind, 1).scenario)
+    problem = build_problem(recorded(tmp_path, kind, 1).scenario, prior_scale=10.0)
     calibration = calibrate(problem)
     assert len(calls) == 3  # though biases are held as not identifiable
     has_heights = kind != "bearing_slant_range"  # one slant range leaves the height open, and the likelihood jumps
@@ -117,7 +117,7 @@ def test_noise_detection_and_clutter_of_one_radar_are_estimated_and_its_biases_a
 
 
 def test_rows_without_an_altitude_are_calibrated(tmp_path: Path) -> None:
-    problem = build_problem(recorded(tmp_path, "bearing_range_altitude", no_altitude=0.3).scenario)
+    problem = build_problem(recorded(tmp_path, "bearing_range_altitude", no_altitude=0.3).scenario, prior_scale=10.0)
     calibration = calibrate(problem, only=[each for each in problem.parameters if each.kind == "bias"])
     assert calibration.converged
     for each in calibration.estimates:

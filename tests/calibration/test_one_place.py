@@ -63,7 +63,9 @@ def calibration_of(
         csv.writer(file).writerows([["time", "sensor", "range", "bearing_deg", "own_x", "own_y"], *rows])
     sensors = "".join(f"  - {{name: r{s}, position: [0, 0], bias: {{range: 7.0}}}}\n" for s in range(len(courses)))
     (folder / "radars.yaml").write_text(TEXT + sensors, "utf-8")
-    problem = build_problem(scenario_from_recording(folder / "radars.yaml", folder / "scans.csv").scenario)
+    problem = build_problem(
+        scenario_from_recording(folder / "radars.yaml", folder / "scans.csv").scenario, prior_scale=10.0
+    )
     return calibrate(problem, only=[each for each in problem.parameters if each.kind in kinds])
 
 
@@ -123,7 +125,7 @@ def test_sensors_on_one_straight_course_are_at_one_place(courses: Sequence[Cours
     sensors, zeros = table[:, 1].astype(np.int64), np.zeros((num, 2))
     states = np.column_stack([np.full(num, 500.0), np.full(num, 3000.0), zeros, zeros])
     pairs = MatchedMeasurements(
-        table[:, 0], sensors, np.zeros(num, np.int64), zeros, table[:, 2:], states, none, none, none
+        table[:, 0], sensors, np.zeros(num, np.int64), zeros, table[:, 2:], states, none[:, None], none, none
     )
     assert is_one_place(pairs, range(len(courses))) is wanted
     assert is_one_place(pairs, [len(courses)])  # a sensor without measurements of any target
@@ -136,7 +138,8 @@ def test_groups_share_targets_directly_or_through_others() -> None:
     sensors, tracks = np.array(rows).T
     num, none = len(rows), np.zeros(7, np.int64)
     measured, poses, states = np.zeros((num, 2)), np.zeros((num, 2)), np.zeros((num, 4))
-    pairs = MatchedMeasurements(np.arange(float(num)), sensors, tracks, measured, poses, states, none, none, none)
+    own = measured, poses, states, none[:, None], none, none
+    pairs = MatchedMeasurements(np.arange(float(num)), sensors, tracks, *own)
     assert groups_with_common_targets(pairs, 7) == [[0, 2, 3], [1, 4], [5], [6]]
 
 
@@ -164,7 +167,9 @@ def test_the_noise_of_a_single_sensor_of_positions_is_estimated(tmp_path: Path) 
         "     noise: {kind: constant, std: [22.0, 22.0]}, detection: {kind: constant, probability: 0.8}}\n",
         "utf-8",
     )
-    problem = build_problem(scenario_from_recording(tmp_path / "sensors.yaml", tmp_path / "scans.csv").scenario)
+    problem = build_problem(
+        scenario_from_recording(tmp_path / "sensors.yaml", tmp_path / "scans.csv").scenario, prior_scale=10.0
+    )
     found = calibrate(problem, only=[each for each in problem.parameters if each.kind == "noise"])
     for each, true in zip(found.estimates, (30.0, 18.0), strict=True):
         assert each.ci_low < true < each.ci_high

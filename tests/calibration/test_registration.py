@@ -64,7 +64,7 @@ def pairs_of(seconds: float = 200.0) -> MatchedMeasurements:
     table, none = np.array(rows), np.zeros(6, np.int64)
     whole = table[:, 1:3].astype(np.int64)
     return MatchedMeasurements(
-        table[:, 0], whole[:, 0], whole[:, 1], table[:, 3:6], table[:, 6:9], table[:, 9:], none, none, none
+        table[:, 0], whole[:, 0], whole[:, 1], table[:, 3:6], table[:, 6:9], table[:, 9:], none[:, None], none, none
     )
 
 

@@ -43,6 +43,25 @@ def test_estimates_are_printed_and_their_file_is_used_for_tracking(place: Path) 
     assert scores[1] < scores[0]
 
 
+def test_track_estimates_first_what_the_file_does_not_give(place: Path) -> None:
+    """Biases and clutter; noise and detection are given, and the fit does not find them wrong."""
+    words = ("track", "scans.csv", "--sensors", "radars.yaml", "--truth", "truth.csv", "--json")
+    plain = json.loads(call(*words).stdout)
+    result = call(*words, "--calibrate", "--out", "tracked")
+    assert result.exit_code == 0, result.output
+    told = json.loads(result.stdout)
+    assert plain["calibration"] is None
+    rows = {(row["sensor"], row["parameter"]): row for row in told["calibration"]["parameters"]}
+    assert {name for _, name in rows} == {"bearing_deg", "range", "clock", "clutter.rate"}
+    assert rows["boat", "range"]["kept"] is None
+    assert abs(rows["boat", "range"]["estimate"] - 300.0) < 60.0
+    assert told["ospa"]["total"] < plain["ospa"]["total"]
+    written = read_yaml((place / "tracked/sensors.yaml").read_text("utf-8"), "sensors.yaml").data["sensors"][1]
+    assert written["bias"]["range"] == pytest.approx(rows["boat", "range"]["estimate"], rel=1e-6)
+    assert written["detection"]["probability"] == 0.95
+    assert "tracked/sensors.yaml" in told["written"]
+
+
 def test_windows_are_printed_side_by_side_and_the_last_is_written(place: Path) -> None:
     words = ("calibrate", "scans.csv", "--sensors", "radars.yaml", "--window", "60", "--out", "found.yaml")
     result = call(*words)

@@ -116,7 +116,7 @@ def test_a_fault_is_named_with_its_sensor_and_size(test: str) -> None:
     [finding, *_] = [each for each in fit.findings if each.test == test and each.sensor == "east"]
     assert finding.text.startswith("east: ")
     assert re.search(words, finding.text), finding.text
-    assert "`vedette calibrate`" in finding.text
+    assert "`vedette track --calibrate`" in finding.text
 
 
 def test_without_tracks_nothing_is_searched() -> None:

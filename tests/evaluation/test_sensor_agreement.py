@@ -77,7 +77,7 @@ def test_a_steady_offset_is_for_calibration(tmp_path: Path) -> None:
     )
     assert found is not None
     assert float(found[1]) == pytest.approx(400.0, abs=60.0)
-    assert lines[1].endswith("`vedette calibrate` finds biases of range, bearing, clock and place")
+    assert lines[1].endswith("`vedette track --calibrate` finds biases of range, bearing and clock")
 
 
 def test_coverage_without_overlap_gives_a_warning_before_the_run(tmp_path: Path) -> None:

@@ -240,7 +240,8 @@ def test_calibrate_finds_bias_and_noise_of_range_rates(tmp_path: Path, most: flo
     largest = made.scenario.model.sensors[0].clutter.max_range_rate
     assert largest is None if most is not None else largest > 9.0
     found = {
-        (each.parameter.sensor, each.parameter.name): each for each in calibrate(build_problem(made.scenario)).estimates
+        (each.parameter.sensor, each.parameter.name): each
+        for each in calibrate(build_problem(made.scenario, prior_scale=10.0)).estimates
     }
     for s, bias in enumerate(biases.values()):
         assert found[s, "range_rate"].reason == ""

@@ -56,8 +56,8 @@ def calibrate_windows(
 
 
 def warm_started(problem: Problem, calibration: Calibration) -> Problem:
-    """Return the problem with each parameter starting at its estimate."""
-    found = {replace(each.parameter, start=0.0): each.value for each in calibration.estimates}
+    """Return the problem with each parameter starting at its estimate, if it is better than the assumed value."""
+    found = {replace(each.parameter, start=0.0): each.value for each in calibration.estimates if each.is_better}
     parameters = [replace(each, start=found.get(replace(each, start=0.0), each.start)) for each in problem.parameters]
     return replace(problem, parameters=tuple(parameters))
 

@@ -10,40 +10,34 @@ from typing import NamedTuple
 
 import numpy as np
 
-from vedette.calibration.maximum_likelihood import Maximum, Terms, conditional_maximum, covariance, maximise
-from vedette.calibration.parameters import Parameter, Problem
-from vedette.calibration.registration import (
-    BIASES,
-    MOST_FITTED,
-    MatchedMeasurements,
-    fitted,
-    groups_with_common_targets,
-    is_one_place,
-    match_measurements,
-    register,
+from vedette.calibration.held_back import blocks_of_time, held_back_gains
+from vedette.calibration.initial_guess import NO_SHARED, initial_guess
+from vedette.calibration.maximum_likelihood import (
+    Maximum,
+    Terms,
+    conditional_maximum,
+    covariance,
+    maximise,
+    stds_from_blocks,
 )
-from vedette.internal.quantities import COMPONENTS, QUANTITIES
-from vedette.kernels.base.types import Floats
+from vedette.calibration.parameters import Parameter, Problem
+from vedette.kernels.base.types import Floats, Ints
 
-_NEARER = 3.0  # multiple of the estimated noise, in the next round
 _QUANTILE = 1.959964  # of the normal distribution, 97.5 %
 _COMPARED = ("clock", "x", "y")  # components that are relative to those of the first sensor
-_OTHER_MOTION = "another motion of the targets than assumed"
-_BY_MOTION = {  # biases that need a second sensor at another place: effect that looks the same without one
-    ("bearing",): "a rotation of all targets",
-    ("range",): _OTHER_MOTION,
-    ("elevation", "altitude"): _OTHER_MOTION,
-}
-_NO_SHARED = "no other sensor observes enough of the same targets"
+_NO_BETTER = "held-back scans fit no better with the estimate"
 _SHORT = 1.0  # log likelihood by which a search with fixed parameters may exceed the full search
 _PART = 0.1  # share of a parameter in undetermined directions above which it is not identifiable
+_MOST_PRIORS = 5.0  # prior standard deviations within which an estimate is plausible
+_KINDS = ("clutter", "detection", "noise", "bias")  # in the order of their tests; those of a sensor are a group
 
 
 class ParameterEstimate(NamedTuple):
     """Estimate of a parameter.
 
     value, ci_low, ci_high: estimate and its 95 % confidence interval; NaN limits if the search did not converge.
-    reason: why the parameter is not identifiable; empty if it is.
+    reason: why there is no estimate, as "not identifiable: ..." or "implausible: ..."; empty if there is one. kept:
+    reason to keep the assumed value although there is an estimate; empty if there is none.
     """
 
     parameter: Parameter
@@ -51,6 +45,12 @@ class ParameterEstimate(NamedTuple):
     ci_low: float
     ci_high: float
     reason: str
+    kept: str = ""
+
+    @property
+    def is_better(self) -> bool:
+        """True if the estimate replaces the assumed value."""
+        return not self.reason and not self.kept
 
     @property
     def std(self) -> float:
@@ -61,9 +61,9 @@ class ParameterEstimate(NamedTuple):
 class Calibration(NamedTuple):
     """Estimates of all parameters.
 
-    log_likelihood, initial_log_likelihood: of the recording, with the estimates and with the assumed values. converged:
-    whether the search converged. rank: rank of the information matrix, the number of directions in parameter space that
-    the recording determines.
+    log_likelihood, initial_log_likelihood: of the recording, with the better values and with the assumed ones.
+    converged: True if the search converged. rank: rank of the information matrix, the number of directions in
+    parameter space that the recording determines.
     """
 
     estimates: tuple[ParameterEstimate, ...]
@@ -97,187 +97,124 @@ def calibrate(
         return problem.log_likelihoods(whole)
 
     before = float(terms(said[asked], asked).sum())
-    guessed, groups, by_motion = _guess(problem, said, asked, progress)
-    apart = [s for group in groups if group != groups[0] or len(group) == 1 for s in group]
-    held = {i: _unknown(problem, i, why) for i, why in by_motion.items()}
-    free = [i for i in asked if i not in held]
+    guess = initial_guess(problem, said, asked, progress)
+    apart = [s for group in guess.groups if group != guess.groups[0] or len(group) == 1 for s in group]
+    found = {i: _without(problem.parameters[i], f"not identifiable: {why}") for i, why in guess.held.items()}
+    own = free = [i for i in asked if i not in found]
     if not free:
-        return Calibration(tuple(held[i] for i in asked), before, before, True, 0)
-    start = guessed if float(terms(guessed[free], free).sum()) > before else said.copy()
-    found, directions, own = held, list[int](), free
-    highest, again = math.inf, False
+        return Calibration(tuple(found[i] for i in asked), before, before, True, 0)
+    start, blocks = said.copy(), blocks_of_time(problem.term_times())
+    start[free] = guess.free[free]
+    highest, again, ranks = math.inf, False, list[int]()
     while True:
-        maximum, judged, rank = _found(problem, own, partial(terms, own=own), start[own], apart)
+        part = replace(problem, parameters=tuple(problem.parameters[i] for i in own))
+        unknown = np.array([each.unknown for each in part.parameters])
+        of_own = partial(terms, own=own)
+        if float(of_own(start[own]).sum()) < before:
+            start[own] = said[own]
+        maximum = maximise(of_own, start[own], unknown, _correlated(part.parameters), blocks, guess.stds[own])
+        cov, lost = covariance(maximum.information, unknown)
         if not again and maximum.log_likelihood > highest + _SHORT:
             # Higher with fixed parameters: the full search stopped short of its maximum; restart it from here, once.
             start[own], own, again = maximum.at, free, True
-            directions.clear()
+            ranks.clear()
             continue
         highest = maximum.log_likelihood
+        judged = _judged(part, maximum, cov, lost, apart, blocks)
         found |= zip(own, judged, strict=True)
-        directions.append(rank)
+        ranks.append(len(own) - round(float(np.trace(lost))))
         told = [i for i in own if not found[i].reason]
         if told == own or not told:
             break
         # Fix parameters that are not identifiable at the assumed values, and maximise over the others.
-        unknown = np.array([problem.parameters[i].unknown for i in own])
         start[own] = conditional_maximum(maximum, unknown, [i not in told for i in own], said[own])
         own = told
-    log_likelihood = maximum.log_likelihood if told else before
+    if told and maximum.converged:
+        found |= zip(own, _compared_with_given(part, judged, of_own, maximum, cov, blocks), strict=True)
     kept = tuple(found[i] for i in asked)
     if not maximum.converged:  # second derivatives away from a maximum are not the information
         kept = tuple(each._replace(ci_low=math.nan, ci_high=math.nan) for each in kept)
-    return Calibration(kept, log_likelihood, before, maximum.converged, directions[0])
+    better = [each.value if each.is_better and maximum.converged else each.parameter.start for each in kept]
+    free_values = [each.parameter.to_free(value) for each, value in zip(kept, better, strict=True)]
+    log_likelihood = float(terms(np.array(free_values), asked).sum())
+    return Calibration(kept, log_likelihood, before, maximum.converged, ranks[0])
 
 
-def _biases_by_motion(problem: Problem, pairs: MatchedMeasurements, groups: Sequence[Sequence[int]]) -> dict[int, str]:
-    """Return the biases that would follow from the assumed motion of the targets alone, and what looks the same.
-
-    They are those of a sensor that shares no targets with a sensor at another place. Of several sensors at one place
-    they are those of the first, which the others are compared with. A sensor that measures positions suffices anywhere.
-
-    groups: of sensors that share targets.
-    """
-    kinds, found = [COMPONENTS[site.kind] for site in problem.sites], dict[int, str]()
-    for group in groups:
-        if any("x" in kinds[s] for s in group) or not is_one_place(pairs, group):
-            continue
-        for names, effect in _BY_MOTION.items():
-            first = next((s for s in group if {*names} & {*kinds[s]}), None)
-            for i, each in enumerate(problem.parameters):
-                if each.sensor == first and each.kind == "bias" and each.component in names:
-                    found[i] = effect
-    return found
-
-
-def _unknown(problem: Problem, i: int, effect: str) -> ParameterEstimate:
-    """Return a bias that would follow from the assumed motion alone, as not identifiable. effect: looks the same."""
-    own, alone = problem.parameters[i], len(problem.sites) == 1
-    lacking = "there is no other sensor" if alone else f"{_NO_SHARED} from another place"
-    reason = f"not identifiable: {lacking} to separate it from {effect}"
-    return ParameterEstimate(own, own.start, math.nan, math.nan, reason)
-
-
-def _found(
-    problem: Problem, own: Sequence[int], terms: Terms, start: Floats, apart: Sequence[int]
-) -> tuple[Maximum, tuple[ParameterEstimate, ...], int]:
-    """Return the maximum over some of the parameters, their estimates, and the number of determined directions."""
-    parameters = tuple(problem.parameters[i] for i in own)
+def _compared_with_given(
+    problem: Problem,
+    estimates: Sequence[ParameterEstimate],
+    terms: Terms,
+    maximum: Maximum,
+    cov: Floats,
+    blocks: Ints,
+) -> list[ParameterEstimate]:
+    """Return the estimates with the reason to keep the given values of those that fit held-back scans no better."""
+    parameters, kept = problem.parameters, list(estimates)
+    keys = [(_KINDS.index(each.kind), each.sensor, each.component == "clock") for each in parameters]
+    groups = [[i for i, key in enumerate(keys) if key == own] for own in sorted(set(keys))]
+    given = problem.free([each.start for each in parameters])
+    for group, (gain, error) in zip(groups, held_back_gains(terms, maximum, cov, given, groups, blocks), strict=True):
+        if gain <= error:
+            for i in group:
+                kept[i] = kept[i]._replace(kept=f"{_NO_BETTER} (log likelihood {gain:+.1f} ± {error:.1f})")
+    # The others are estimated given the values that stay.
     unknown = np.array([each.unknown for each in parameters])
-    maximum = maximise(terms, start, unknown, _blocks(parameters))
-    cov, lost = covariance(maximum.information, unknown)
-    judged = _judged(replace(problem, parameters=parameters), maximum.at, cov, lost, apart)
-    return maximum, judged, len(own) - round(float(np.trace(lost)))
+    moved = conditional_maximum(maximum, unknown, [not each.is_better for each in kept], given) - maximum.at
+    return [_moved(each, by) if each.is_better else each for each, by in zip(kept, moved.tolist(), strict=True)]
 
 
-def _blocks(parameters: tuple[Parameter, ...]) -> list[list[int]]:
+def _moved(estimate: ParameterEstimate, by: float) -> ParameterEstimate:
+    """Return an estimate and its interval moved on the parameter's scale."""
+    own = estimate.parameter
+    value, low, high = (own.from_free(own.to_free(each) + by) for each in estimate[1:4])
+    return estimate._replace(value=value, ci_low=low, ci_high=high)
+
+
+def _without(parameter: Parameter, reason: str) -> ParameterEstimate:
+    """Return a parameter at its assumed value, without an estimate."""
+    return ParameterEstimate(parameter, parameter.start, math.nan, math.nan, reason)
+
+
+def _correlated(parameters: tuple[Parameter, ...]) -> list[list[int]]:
     """Return the groups of parameters that may be correlated: all biases; and per sensor noise, detection and clutter.
 
     The information between biases and the rest is 0 if measurements are Gaussian.
     """
-    blocks = [[i for i, each in enumerate(parameters) if each.kind == "bias"]]
+    groups = [[i for i, each in enumerate(parameters) if each.kind == "bias"]]
     for s in sorted({each.sensor for each in parameters}):
-        blocks.append([i for i, each in enumerate(parameters) if each.kind != "bias" and each.sensor == s])
-    return blocks
-
-
-class _Guess(NamedTuple):
-    """Initial guess.
-
-    free: values of all parameters on their scales. groups: of sensors that share targets. by_motion: biases that would
-    follow from the assumed motion alone, which stay at their start values; and what looks the same.
-    """
-
-    free: Floats
-    groups: list[list[int]]
-    by_motion: dict[int, str]
-
-
-def _guess(problem: Problem, said: Floats, asked: Sequence[int], progress: Callable[[], None]) -> _Guess:
-    """Return an initial guess of the parameters, and of the biases among `asked`.
-
-    The recording is tracked with noise as wide as the biases may be, then with narrower noise; biases are fitted each
-    time, except those that the measurements matched this time leave to the assumed motion.
-    """
-    values, sites = problem.values(said), problem.sites
-    names = [(MOST_FITTED * COMPONENTS[site.kind])[:MOST_FITTED] for site in sites]
-    stds = np.array([[QUANTITIES[name].far for name in own] for own in names])
-    # The initial guess leaves out range rates: their noise is as wide as their bias may be.
-    places, wide, unknown = {}, QUANTITIES["range_rate"].far, np.ones((len(sites), len(BIASES)))
-    for i in asked:
-        each = problem.parameters[i]
-        if each.kind == "bias" and each.component in BIASES:
-            places[i] = at = each.sensor, BIASES.index(each.component)
-            unknown[at] = each.unknown / abs(each.per_si)
-    for _ in range(3):
-        recording = problem.without_biases(values)
-        progress()
-        pairs = match_measurements(problem.tracker(_with_noise(problem, values, stds, wide))[0], recording, sites, stds)
-        groups = groups_with_common_targets(pairs, len(sites))
-        by_motion = {i: why for i, why in _biases_by_motion(problem, pairs, groups).items() if i in asked}
-        fitting = np.zeros(unknown.shape, bool)
-        for i, at in places.items():
-            fitting[at] = i not in by_motion
-        found = register(pairs, sites, fitting, unknown, stds, _period(problem))
-        for i, at in places.items():
-            each = problem.parameters[i]
-            values[i] = each.start if i in by_motion else values[i] + each.per_si * found.biases[at]
-        stds = np.minimum(stds, _NEARER * found.stds)
-    values = _with_noise(problem, values, found.stds, None)
-    return _Guess(problem.free(_with_counts(problem, values, pairs).tolist()), groups, by_motion)
-
-
-def _period(problem: Problem) -> float:
-    """Return the mean period of the slowest sensor, s."""
-    recording = problem.recording
-    nums = [sum(scans[s] is not None for scans in recording.scans) for s in range(len(problem.sites))]
-    return max(1e-3, float(recording.times[-1])) / max(1, min(num for num in nums if num))
-
-
-def _with_noise(problem: Problem, values: Floats, stds: Floats, rates: float | None) -> Floats:
-    """Return the values with noise of these standard deviations, (num_sensors, MOST_FITTED).
-
-    rates: the same for range rates, m/s; None: as assumed.
-    """
-    values = values.copy()
-    for i, each in enumerate(problem.parameters):
-        if each.kind == "noise":
-            names = fitted(problem.sites[each.sensor].kind)
-            own = stds[each.sensor, names.index(each.component)] if each.component in names else rates
-            values[i] = each.start if own is None else abs(each.per_si) * own
-    return values
-
-
-def _with_counts(problem: Problem, values: Floats, pairs: MatchedMeasurements) -> Floats:
-    """Return the values with detection probabilities and clutter rates from the matched tracks and measurements."""
-    values, hits = values.copy(), np.bincount(pairs.sensors, minlength=len(problem.sites))
-    for i, each in enumerate(problem.parameters):
-        s = each.sensor
-        if each.kind == "detection" and hits[s]:
-            values[i] = min(max(hits[s] / (hits[s] + pairs.missed[s]), 0.05), 0.98)
-        elif each.kind == "clutter" and pairs.scans[s]:
-            values[i] = max(pairs.false[s] / pairs.scans[s], 0.01)
-    return values
+        groups.append([i for i, each in enumerate(parameters) if each.kind != "bias" and each.sensor == s])
+    return groups
 
 
 def _judged(
-    problem: Problem, at: Floats, cov: Floats, lost: Floats, apart: Sequence[int]
+    problem: Problem, maximum: Maximum, cov: Floats, lost: Floats, apart: Sequence[int], blocks: Ints
 ) -> tuple[ParameterEstimate, ...]:
-    """Return the estimate of each parameter with its interval, or with the reason why it is not identifiable.
+    """Return the estimate of each parameter with its interval, or with the reason why there is none.
 
-    cov, lost: results of `covariance`. apart: sensors that share no targets with the others.
+    cov, lost: results of `covariance`. apart: sensors that share no targets with the others. blocks: of the terms.
     """
-    found = []
-    for i, (each, free) in enumerate(zip(problem.parameters, at.tolist(), strict=True)):
+    found, stds = [], np.maximum(np.sqrt(np.diag(cov)), stds_from_blocks(maximum.scores, cov, blocks))
+    for i, (each, free) in enumerate(zip(problem.parameters, maximum.at.tolist(), strict=True)):
         partners = [j for j in np.flatnonzero(np.abs(lost[i]) > _PART).tolist() if j != i]
         compared = each.kind == "bias" and each.sensor in apart and each.component in _COMPARED
         if compared or lost[i, i] > _PART:
             why = _why(problem, i, [] if compared else partners, each.sensor in apart)
-            found.append(ParameterEstimate(each, each.start, math.nan, math.nan, why))
+            found.append(_without(each, why))
             continue
-        reach = _QUANTILE * math.sqrt(cov[i, i])
+        reach = _QUANTILE * float(stds[i])
         value, low, high = (each.from_free(x) for x in (free, free - reach, free + reach))
+        if maximum.converged and abs(free - each.to_free(each.start)) > _MOST_PRIORS * each.usual:
+            why = f"implausible: {value:.3g} {each.unit} is estimated, far from {each.start:.3g} {each.unit}"
+            found.append(_without(each, why))
+            continue
         found.append(ParameterEstimate(each, value, low, high, ""))
+    if far := [each.parameter for each in found if each.parameter.kind == "bias" and each.reason.startswith("impl")]:
+        # Biases are of one fit: the others would make up for one that is held.
+        why = f"implausible: fitted together with the {far[0].label} of {problem.sites[far[0].sensor].name}"
+        found = [
+            _without(each.parameter, why) if each.parameter.kind == "bias" and not each.reason else each
+            for each in found
+        ]
     return tuple(found)
 
 
@@ -289,7 +226,7 @@ def _why(problem: Problem, i: int, partners: list[int], is_apart: bool) -> str:
         return "not identifiable: the recording contains almost no information about this parameter"
     if alone or is_apart:
         what = {"bearing": "a rotation", "clock": "a shift in time"}.get(own.component, "a shift")
-        lacking = "there is no other sensor" if alone else _NO_SHARED
+        lacking = "there is no other sensor" if alone else NO_SHARED
         beside = f" (with {', '.join(names)})" if names else ""
         return f"not identifiable: {lacking} to separate it{beside} from {what} of all targets"
     if names:

@@ -1,25 +1,30 @@
 """Maximum of a log likelihood that is a sum of many terms, and its information matrix.
 
-Steps use the outer products of the terms' scores (Berndt, Hall, Hall, Hausman 1974), which need no second differences
-and equal the information if the model holds. The final information uses second differences.
+Steps are Newton's. The curvature along each parameter is that of central differences; correlations of parameters are
+those of the terms' scores (Berndt, Hall, Hall, Hausman 1974). Steps that continue near the maximum use one-sided
+differences with the curvature known, at half the cost.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
+from scipy.special import stdtrit
 
-from vedette.kernels.base.types import Bools, Floats
+from vedette.kernels.base.types import Bools, Floats, Ints
 
 Terms = Callable[[Floats], Floats]  # terms of the log likelihood as a function of all parameters on their scales
-_ENOUGH = 0.05  # convergence: log likelihood that a further step promises
-_JUMPS = 0.5  # the same by second derivatives: the terms may jump by this much
-_MOST_STEPS = 15
+_ENOUGH = 0.4  # convergence: largest further step, in standard errors
+_JUMPS = 0.6  # the same where no share of it raises the sum, as the terms may jump
+_NEAR = 4.0  # the same, below which the curvature is not computed again
+_RAISED = 1.0  # log likelihood that twice a step must gain
+_MOST_STEPS = 8
 _SHARES = (1.0, 0.5, 0.25, 0.1)  # fractions of a step to try
-_STEP = 0.5  # step of differences, in conditional standard deviations
 _TELLING = 4.0  # eigenvalue of the information, in units of `unknown`, above which a direction is determined
+_WEAK = 25.0  # eigenvalue below which the curvature along a direction is computed
 _REFINEMENTS = 3
 _ALIKE = 1.5  # largest ratio of the curvature over a step and the curvature that chose the step
 
@@ -27,45 +32,132 @@ _ALIKE = 1.5  # largest ratio of the curvature over a step and the curvature tha
 class Maximum(NamedTuple):
     """Maximum over p parameters on their scales.
 
-    at: (p,) parameters. log_likelihood: value there. information: (p, p) minus its second derivatives there. converged:
-    whether a further step promises next to nothing, by outer products or by second derivatives.
+    at: (p,) parameters. terms: (num_terms,) there. scores: (num_terms, p) their derivatives. information: (p, p) minus
+    the second derivatives of the sum. converged: whether a further step promises next to nothing.
     """
 
     at: Floats
-    log_likelihood: float
+    terms: Floats
+    scores: Floats
     information: Floats
     converged: bool
 
+    @property
+    def log_likelihood(self) -> float:
+        """Sum of the terms."""
+        return float(self.terms.sum())
 
-def maximise(terms: Terms, start: Floats, unknown: Floats, blocks: Sequence[Sequence[int]]) -> Maximum:
+
+@dataclass(slots=True)
+class _Search:
+    """Point of the search, with what is known there; see `Maximum`. bends: (num_terms, p) minus second derivatives."""
+
+    terms: Terms
+    at: Floats
+    values: Floats
+    steps: Floats
+    bends: Floats
+
+    def central(self) -> Floats:
+        """(num_terms, p) scores; computes the second derivatives, too."""
+        ways = np.diag(self.steps)
+        up = np.stack([self.terms(self.at + way) for way in ways], axis=1)
+        down = np.stack([self.terms(self.at - way) for way in ways], axis=1)
+        self.bends = (2.0 * self.values[:, None] - up - down) / self.steps**2
+        return np.asarray((up - down) / (2.0 * self.steps))
+
+    def one_sided(self) -> Floats:
+        """(num_terms, p) scores with second derivatives from before."""
+        up = np.stack([self.terms(self.at + way) for way in np.diag(self.steps)], axis=1)
+        return np.asarray((up - self.values[:, None]) / self.steps + 0.5 * self.steps * self.bends)
+
+    def advance(self, way: Floats) -> bool:
+        """Move by the first share of a step that raises the sum, and further if the whole does; False if none does."""
+        for share in _SHARES:
+            found = self.terms(self.at + share * way)
+            if found.sum() > self.values.sum():
+                break
+        else:
+            return False
+        while share >= 1.0 and (further := self.terms(self.at + 2.0 * share * way)).sum() > found.sum() + _RAISED:
+            share, found = 2.0 * share, further
+        self.at, self.values = self.at + share * way, found
+        return True
+
+
+def maximise(
+    terms: Terms,
+    start: Floats,
+    unknown: Floats,
+    groups: Sequence[Sequence[int]],
+    blocks: Ints,
+    stds: Floats | None = None,
+) -> Maximum:
     """Return the maximum of a sum of terms near a start.
 
     Args:
         terms: (num_terms,) as a function of parameters (p,).
         start: (p,).
-        unknown: (p,) prior scale of each parameter; directions in which the terms hardly change over it are not
-            followed.
-        blocks: groups of parameters with second derivatives within a group; they are 0 between groups.
+        unknown: (p,) prior standard deviation of each parameter; directions in which the terms hardly change over it
+            are not followed.
+        groups: of parameters, with second derivatives within a group; they are 0 between groups.
+        blocks: (num_terms,) numbers of blocks of terms that are independent of each other.
+        stds: (p,) expected standard deviations of the parameters, over which differences are taken; None: unknown.
     """
-    at, steps = start.copy(), 0.01 * unknown
-    highest, converged = float(terms(at).sum()), False
+    steps = 0.1 * unknown if stds is None else np.minimum(stds, unknown)
+    search = _Search(terms, start, terms(start), steps, np.zeros(0))
+    prior, size, converged = np.diag(unknown**-2.0), np.inf, False
     for _ in range(_MOST_STEPS):
-        scores = _scores(terms, at, steps)
-        slope, products = scores.sum(axis=0), scores.T @ scores
-        steps = _STEP / np.sqrt(np.diag(products) + unknown**-2.0)
-        way = np.linalg.solve(products + np.diag(unknown**-2.0), slope)
-        promised = float(0.5 * slope @ way)
-        if converged := promised < _ENOUGH:
+        far = size > _NEAR
+        scores = search.central() if far else search.one_sided()
+        if far:
+            information = _information(scores, search.bends, unknown, groups)
+        bounded = np.asarray(np.linalg.inv(information + prior), np.float64)
+        stds = np.sqrt(np.diag(bounded))
+        errors = np.maximum(stds, stds_from_blocks(scores, bounded, blocks))
+        if far:  # wide steps smooth jumps, but stay near the maximum where parameters are correlated
+            search.steps = errors / stds / np.sqrt(np.diag(information + prior))
+        way = bounded @ scores.sum(axis=0)
+        size = float(np.abs(way / errors).max())
+        if converged := size < _ENOUGH:
             break
-        at, found = _best(terms, at, way, highest)
-        if found <= highest:
-            break
-        highest = found
-    slope, information = _second(terms, at, highest, 2.0 * steps, blocks)
-    way = covariance(information, unknown)[0] @ slope
-    converged = converged or float(0.5 * slope @ way) < _JUMPS  # outer products promise too much if the terms jump
-    at, highest = _best(terms, at, way, highest)
-    return Maximum(at, highest, _refined(terms, at, highest, information, unknown), converged)
+        if not search.advance(way):
+            if far or size < _JUMPS:
+                converged = size < _JUMPS
+                break
+            size = np.inf  # one-sided differences may be too inexact
+    refined = _refined(terms, search.at, search.values.sum(), information, unknown)
+    return Maximum(search.at, search.values, scores, refined, converged)
+
+
+def _information(scores: Floats, bends: Floats, unknown: Floats, groups: Sequence[Sequence[int]]) -> Floats:
+    """(p, p) information: curvatures, and correlations of the scores within groups."""
+    centred, curvatures = scores - scores.mean(axis=0), bends.sum(axis=0)
+    products = centred.T @ centred + np.diag(1e-6 * unknown**-2.0)
+    sizes = np.where(curvatures > unknown**-2.0, curvatures, np.diag(products))
+    same = np.zeros(products.shape, np.bool_)
+    for group in groups:
+        same[np.ix_(group, group)] = True
+    scale = np.sqrt(sizes / np.diag(products))
+    return np.asarray(np.where(same, products, 0.0) * np.outer(scale, scale))
+
+
+def block_scores(scores: Floats, blocks: Ints) -> Floats:
+    """(num_blocks, p) sums of scores (num_terms, p) over blocks, less their mean."""
+    sums = np.stack([np.bincount(blocks, column) for column in scores.T], axis=1)
+    return np.asarray(sums - sums.mean(axis=0))
+
+
+def stds_from_blocks(scores: Floats, cov: Floats, blocks: Ints) -> Floats:
+    """(p,) standard errors of a maximum from its scores, for quantiles of the normal distribution.
+
+    Terms may depend on each other within a block, as errors do that last for some scans. cov: (p, p) covariance if all
+    terms were independent; its product with the scores of a block is the influence of that block on the maximum.
+    """
+    influences = np.asarray(block_scores(scores, blocks) @ cov)
+    num = len(influences)
+    widening = stdtrit(num - 1, 0.975) / stdtrit(np.inf, 0.975)  # of few blocks
+    return np.asarray(np.sqrt((influences**2).sum(axis=0) * num / (num - 1)) * widening)
 
 
 def covariance(information: Floats, unknown: Floats) -> tuple[Floats, Floats]:
@@ -106,13 +198,13 @@ def _spectrum(information: Floats, unknown: Floats) -> tuple[Floats, Floats]:
 
 
 def _refined(terms: Terms, at: Floats, highest: float, information: Floats, unknown: Floats) -> Floats:
-    """(p, p) information, each eigenvalue by differences over the standard deviation of its direction.
+    """(p, p) information, each small eigenvalue by differences over the standard deviation of its direction.
 
     The information about a poorly determined combination of parameters is small compared with that about each
     parameter, and differences over steps in single parameters lose it in their errors.
     """
     values, vectors = _spectrum(information, unknown)
-    for i in range(len(values)):
+    for i in np.flatnonzero(values < _WEAK).tolist():
         for _ in range(_REFINEMENTS):
             chosen = max(values[i], 1.0)
             way = unknown * vectors[:, i] / np.sqrt(chosen)
@@ -121,41 +213,3 @@ def _refined(terms: Terms, at: Floats, highest: float, information: Floats, unkn
             if chosen / _ALIKE < values[i] < chosen * _ALIKE or max(values[i], chosen) <= 1.0:
                 break
     return np.asarray((vectors * values) @ vectors.T / np.outer(unknown, unknown))
-
-
-def _best(terms: Terms, at: Floats, way: Floats, highest: float) -> tuple[Floats, float]:
-    """Return the point after the first share of a step that improves the sum, and its value; the start if none does.
-
-    If the whole step improves it, longer ones are tried, as far from the maximum outer products make too short steps.
-    """
-    for share in _SHARES:
-        found = float(terms(at + share * way).sum())
-        if found > highest:
-            break
-    else:
-        return at, highest
-    while share >= 1.0 and (further := float(terms(at + 2.0 * share * way).sum())) > found:
-        share, found = 2.0 * share, further
-    return at + share * way, found
-
-
-def _scores(terms: Terms, at: Floats, steps: Floats) -> Floats:
-    """(num_terms, p) derivatives of each term by central differences."""
-    ways = np.diag(steps)
-    found = [(terms(at + way) - terms(at - way)) / (2.0 * step) for way, step in zip(ways, steps, strict=True)]
-    return np.stack(found, axis=1)
-
-
-def _second(
-    terms: Terms, at: Floats, highest: float, steps: Floats, blocks: Sequence[Sequence[int]]
-) -> tuple[Floats, Floats]:
-    """(p,) gradient and (p, p) minus the second derivatives, by central differences over `steps`."""
-    ways = np.diag(steps)
-    up = np.array([float(terms(at + way).sum()) for way in ways])
-    down = np.array([float(terms(at - way).sum()) for way in ways])
-    bend = up + down - 2.0 * highest
-    second = np.diag(bend)
-    for i, j in {(i, j) for block in blocks for i in block for j in block if i < j}:
-        both = float(terms(at + ways[i] + ways[j]).sum()) + float(terms(at - ways[i] - ways[j]).sum())
-        second[i, j] = second[j, i] = 0.5 * (both - 2.0 * highest - bend[i] - bend[j])
-    return (up - down) / (2.0 * steps), -second / np.outer(steps, steps)

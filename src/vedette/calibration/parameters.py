@@ -32,6 +32,7 @@ class Parameter:
         per_si: value that corresponds to one SI unit; negative if the sign is reversed.
         scale: quantity in which intervals are symmetric: the value, its logarithm or its log-odds.
         unknown: standard deviation, on that scale, from which the parameter counts as unknown.
+        usual: standard deviation, on that scale, before any recording; inf: any value is plausible.
     """
 
     sensor: int
@@ -43,6 +44,7 @@ class Parameter:
     per_si: float
     scale: Scale
     unknown: float
+    usual: float = math.inf
 
     @property
     def label(self) -> str:
@@ -111,6 +113,11 @@ class Problem:
     def with_biases(self, values: Floats) -> list[RecordedSensor]:
         """Return the sensors with the biases among these values of the parameters."""
         return with_biases(self.sites, self.parameters, values)
+
+    def term_times(self) -> Floats:
+        """(num_scans,) recorded times of the contributions of `log_likelihoods`, s."""
+        instants = list(zip(self.recording.times.tolist(), self.recording.scans, strict=True))
+        return np.array([time for s in range(len(self.sites)) for time, scans in instants if scans[s] is not None])
 
     def log_likelihoods(self, free: Floats) -> Floats:
         """(num_scans,) contribution of each scan to the log likelihood, ordered by sensor and then by scan.

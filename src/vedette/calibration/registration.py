@@ -43,8 +43,9 @@ class MatchedMeasurements(NamedTuple):
 
     times: (n,) s. sensors, tracks: (n,) numbers. measured: (n, MOST_FITTED) the `fitted` components, then NaN; NaN also
     where a row lacks one. poses: (n, 3) positions and heights of the sensors. states: (n, 6) predicted states of the
-    tracks, [px, py, vx, vy, pz, vz], with zeros where no height is estimated. missed, false, scans: (num_sensors,)
-    numbers of tracks without a measurement, of measurements without a track, and of scans.
+    tracks, [px, py, vx, vy, pz, vz], with zeros where no height is estimated. in_view: (num_sensors, num_tracks)
+    numbers of scans that may detect a track. false, scans: (num_sensors,) numbers of measurements without a track, and
+    of scans.
     """
 
     times: Floats
@@ -53,7 +54,7 @@ class MatchedMeasurements(NamedTuple):
     measured: Floats
     poses: Floats
     states: Floats
-    missed: Ints
+    in_view: Ints
     false: Ints
     scans: Ints
 
@@ -77,7 +78,7 @@ def match_measurements(
     has_heights = any(site.kind in HEIGHT_DEPENDENT for site in sites)
     rngs = (np.random.default_rng(0),) * len(sites)
     state, rows, numbers = tracker.initial(), list[tuple[float | int, ...]](), dict[tuple[int, ...], int]()
-    counts = np.zeros((3, len(sites)), np.int64)
+    counts, seen = np.zeros((2, len(sites)), np.int64), list[tuple[int, int]]()
     for time, scans, poses in zip(recording.times.tolist(), recording.scans, recording.poses, strict=True):
         lmb = as_lmb(state.fused)
         sure = lmb.existence > _SURE
@@ -94,15 +95,18 @@ def match_measurements(
             place = np.append(poses[s, :2], poses[s, OWN_HEIGHT] if poses.shape[1] > OWN_HEIGHT else 0.0)
             own = _fitted_part(scan, sites[s].kind)
             pairs = _assigned(own, means[:, _PLACE] - place, place, sites[s].kind, stds[s])
-            counts[:, s] += len(means) - len(pairs), len(scan) - len(pairs), 1
+            counts[:, s] += len(scan) - len(pairs), 1
+            chances = tracker.sensors[s].detection.prob(moments, poses[s]) if labels else np.empty(0)
+            seen += ((s, label) for label, chance in zip(labels, chances.tolist(), strict=True) if chance > 0.0)
             for i, j in pairs:
                 measured = (*own[i].tolist(), *(math.nan,) * MOST_FITTED)[:MOST_FITTED]
                 rows.append((time, s, labels[j], *measured, *place.tolist(), *means[j].tolist()))
         state = tracker.step(state, list(scans), poses, time, rngs=rngs)[0]
     table = np.array(rows, np.float64).reshape(len(rows), 15)
-    whole = table[:, 1:3].astype(np.int64)
+    whole, in_view = table[:, 1:3].astype(np.int64), np.zeros((len(sites), len(numbers)), np.int64)
+    np.add.at(in_view, tuple(np.array(seen, np.int64).reshape(-1, 2).T), 1)
     return MatchedMeasurements(
-        table[:, 0], whole[:, 0], whole[:, 1], table[:, 3:6], table[:, 6:9], table[:, 9:], *counts
+        table[:, 0], whole[:, 0], whole[:, 1], table[:, 3:6], table[:, 6:9], table[:, 9:], in_view, *counts
     )
 
 
@@ -196,9 +200,14 @@ def is_one_place(pairs: MatchedMeasurements, sensors: Sequence[int]) -> bool:
 
 
 class Registration(NamedTuple):
-    """Biases (num_sensors, num_biases), ordered as `BIASES`; (num_sensors, MOST_FITTED) stds of the residuals."""
+    """Fitted biases.
+
+    biases, bias_stds: (num_sensors, num_biases), ordered as `BIASES`. stds: (num_sensors, MOST_FITTED) standard
+    deviations of the residuals.
+    """
 
     biases: Floats
+    bias_stds: Floats
     stds: Floats
 
 
@@ -226,10 +235,10 @@ def register(
         residuals, own, of_bias = _linearised(pairs, sites, biases, pieces, middles, states)
         spreads = _spreads(residuals, pairs.sensors, pieces, stds)[pairs.sensors]
         rows = _Rows(residuals, own, of_bias * asked[pairs.sensors][:, None], spreads, pairs.sensors, pieces)
-        change, changes = _solved(rows, biases, unknown, len(middles))
+        change, changes, bias_stds = _solved(rows, biases, unknown, len(middles))
         biases, states = biases + change, states + changes
     residuals, _, _ = _linearised(pairs, sites, biases, pieces, middles, states)
-    return Registration(biases, _spreads(residuals, pairs.sensors, pieces, stds))
+    return Registration(biases, bias_stds, _spreads(residuals, pairs.sensors, pieces, stds))
 
 
 class _Rows(NamedTuple):
@@ -312,8 +321,11 @@ def _spreads(residuals: Floats, sensors: Ints, pieces: Ints, stds: Floats) -> Fl
     return found
 
 
-def _solved(rows: _Rows, biases: Floats, unknown: Floats, num_pieces: int) -> tuple[Floats, Floats]:
-    """Return changes of the biases and of the piece states; the states are eliminated first, piece by piece."""
+def _solved(rows: _Rows, biases: Floats, unknown: Floats, num_pieces: int) -> tuple[Floats, Floats, Floats]:
+    """Return changes of the biases and of the piece states, and conditional standard deviations of the biases.
+
+    The states are eliminated first, piece by piece.
+    """
     num, size = biases.shape
     hold = unknown.ravel() ** -2.0
     left, right = np.diag(hold), -hold * biases.ravel()
@@ -334,4 +346,5 @@ def _solved(rows: _Rows, biases: Floats, unknown: Floats, num_pieces: int) -> tu
         parts.append(gain)
     change = np.asarray(np.linalg.solve(left, right), np.float64)
     changes = np.array([gain[:, -1] - gain[:, :-1] @ change for gain in parts], np.float64)
-    return change.reshape(num, size), changes.reshape(num_pieces, 6)
+    conditional = np.diag(left) ** -0.5
+    return change.reshape(num, size), changes.reshape(num_pieces, 6), conditional.reshape(num, size)

@@ -7,7 +7,7 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -23,6 +23,7 @@ from vedette.errors import InputError
 
 if TYPE_CHECKING:
     from vedette.calibration import CalibrationWindow
+    from vedette.evaluation.fit import Fit
     from vedette.scenarios.from_recording import RecordingScenario
 
 NOT_CONVERGED = 3  # exit status
@@ -46,6 +47,16 @@ Window = Annotated[
     ),
 ]
 
+PriorScale = Annotated[
+    float,
+    typer.Option(
+        "--prior-scale",
+        metavar="X",
+        min=0.01,
+        help="Widen the prior of biases (1 deg, 5 m or 1 % of the range, 1 s) and noise by this factor.",
+    ),
+]
+
 
 def calibrate(
     scans: ScansFile,
@@ -55,20 +66,22 @@ def calibrate(
     position: SensorPositions = False,
     biases: Biases = None,
     window: Window = None,
+    prior_scale: PriorScale = 1.0,
     speed: Speed = 10.0,
     bad_rows: BadRows = "refuse",
     trust: Trust = False,
 ) -> None:
     """Estimate sensor biases, noise, detection, clutter.
 
-    From recorded scans alone, by maximum likelihood, with 95 % intervals.
+    From recorded scans alone, by maximum likelihood, with 95 % intervals. Values that are implausible, or fit held-back
+    scans no better, stay as in the file.
     """
     from vedette.scenarios.calibration import calibrated_text
 
     _check_output(out, overwrite)
     recorded, warnings = read_recording(sensors, scans, None, speed=speed, bad_rows=bad_rows, trust=trust)
     with interruptible("nothing was written"):
-        windows = _calibrate(recorded, window or math.inf, position, biases)
+        windows = _calibrate(recorded, window or math.inf, position, biases, prior_scale)
         if out is not None:
             last = windows[-1].calibration._replace(converged=all(part.calibration.converged for part in windows))
             write_text(out, calibrated_text(recorded.scenario, sensors, last, out.parent))
@@ -99,21 +112,48 @@ def _check_output(out: Path | None, overwrite: bool) -> None:
 
 
 def _calibrate(
-    recorded: RecordingScenario, window: float, position: bool, biases: bool | None
+    recorded: RecordingScenario, window: float, position: bool, biases: bool | None, prior_scale: float
 ) -> list[CalibrationWindow]:
     """Return the calibrations of the parts of a recording; biases: None for those of two sensors or more that scan."""
     from vedette.calibration.bias_drift import calibrate_windows
     from vedette.scenarios.calibration import build_problem
 
     if biases is None:
-        instants = recorded.recording.scans
-        biases = len({s for instant in instants for s, scan in enumerate(instant) if scan is not None}) > 1
+        biases = _has_several_sensors(recorded)
         if not biases:
             why = "as manoeuvres look like them"
             note(f"Biases of a single sensor are not estimated, {why}: --biases estimates them.")
-    problem = build_problem(recorded.scenario, position=position, biases=biases)
+    problem = build_problem(recorded.scenario, position=position, biases=biases, prior_scale=prior_scale)
     with compiling(), _pass_counter() as progress:
         return list(calibrate_windows(problem, window, progress))
+
+
+def _has_several_sensors(recorded: RecordingScenario) -> bool:
+    """Return True if two sensors or more scan."""
+    instants = recorded.recording.scans
+    return len({s for instant in instants for s, scan in enumerate(instant) if scan is not None}) > 1
+
+
+def calibrate_doubtful(recorded: RecordingScenario, fit: Fit, sensors: Path) -> tuple[str, dict[str, Any]] | None:
+    """Estimate and print parameters that the sensors file does not give, or that the fit finds wrong.
+
+    Returns the sensors file with the better values, and the calibration as data; None if there is nothing to estimate.
+    """
+    from vedette.calibration import CalibrationWindow, calibrate
+    from vedette.evaluation.doubtful_parameters import doubtful_parameters
+    from vedette.scenarios.calibration import build_problem, calibrated_text
+
+    problem = build_problem(recorded.scenario, biases=_has_several_sensors(recorded))
+    doubtful = doubtful_parameters(problem, recorded, fit)
+    if not doubtful:
+        note("--calibrate: the sensors file gives all values, and the fit names none of them")
+        return None
+    with compiling(), _pass_counter() as progress:
+        found = calibrate(problem, progress, doubtful)
+    names = recorded.scenario.model.sensor_names
+    print_windows([CalibrationWindow(0.0, math.inf, found)], names, position=False)
+    text = calibrated_text(recorded.scenario, sensors, found, None)
+    return text, calibration_document(found, names)
 
 
 @contextmanager

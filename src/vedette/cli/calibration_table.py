@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 from vedette.cli.output import console, echo, note
@@ -29,6 +30,7 @@ def calibration_document(calibration: Calibration, names: tuple[str, ...]) -> di
                 "ci_low": each.ci_low,
                 "ci_high": each.ci_high,
                 "reason": each.reason or None,
+                "kept": each.kept or None,
             }
             for each in calibration.estimates
         ],
@@ -54,14 +56,7 @@ def print_windows(windows: list[CalibrationWindow], names: tuple[str, ...], *, p
     _print_table(windows, names)
     if any(_is_outside(each) for window in windows for each in window.calibration.estimates):
         echo("* the assumed value lies outside the interval")
-    reasons = [
-        f"{each.parameter.label} of {names[each.parameter.sensor]}: {each.reason}"
-        for window in windows
-        for each in window.calibration.estimates
-        if each.reason
-    ]
-    for text in dict.fromkeys(reasons):
-        echo(text)
+    _print_reasons([each for window in windows for each in window.calibration.estimates], names)
     _print_references(windows[0].calibration.estimates, names, position)
     for window in windows:
         calibration = window.calibration
@@ -78,6 +73,19 @@ def print_windows(windows: list[CalibrationWindow], names: tuple[str, ...], *, p
             f"{calibration.log_likelihood:.1f} with the estimates"
         )
         echo(f"{part}Log-likelihood: {values}.")
+
+
+def _print_reasons(estimates: Sequence[ParameterEstimate], names: tuple[str, ...]) -> None:
+    """Print why values stay as they were, once for the parameters of a sensor that share a reason."""
+    labels: dict[tuple[int, str], dict[str, None]] = {}
+    for each in estimates:
+        why = each.reason or (each.kept and f"the assumed value is kept, as {each.kept}")
+        if why:
+            labels.setdefault((each.parameter.sensor, why), {})[each.parameter.label] = None
+    for (sensor, why), own in labels.items():
+        echo(f"{', '.join(own)} of {names[sensor]}: {why}")
+    if any(each.reason.startswith("implausible") for each in estimates):
+        echo("Implausible estimates are more than 5 prior standard deviations away; --prior-scale widens the prior.")
 
 
 def _print_table(windows: list[CalibrationWindow], names: tuple[str, ...]) -> None:
@@ -100,13 +108,13 @@ def _print_table(windows: list[CalibrationWindow], names: tuple[str, ...]) -> No
             parameter, since = estimate.parameter, [f"{window.begin:.0f}"] if several else []
             head = (names[parameter.sensor], parameter.label, parameter.unit, *since, f"{parameter.start:.4g}")
             if estimate.reason:
-                table.add_row(*head, "not identifiable", "", "")
+                table.add_row(*head, estimate.reason.split(":")[0], "", "")
                 continue
             interval = ""
             if not math.isnan(estimate.ci_low):
                 low, high = _interval_ends(estimate)
                 interval = f"{low:>{low_width}} to {high:>{high_width}}"
-            table.add_row(*head, _number(estimate.value, estimate), interval, "*" if _is_outside(estimate) else "")
+            table.add_row(*head, _number(estimate.value, estimate), interval, _mark(estimate))
     table.pad_edge = False
     console().print(table)
 
@@ -121,6 +129,10 @@ def _print_references(estimates: tuple[ParameterEstimate, ...], names: tuple[str
     if position or "x" in others - first:
         subject = "Positions and bearings" if position else "Positions"
         echo(f"{subject} are relative to {name}, the first sensor{'' if others else ', and there is no other'}.")
+
+
+def _mark(each: ParameterEstimate) -> str:
+    return " ".join(["*"] * _is_outside(each) + ["kept"] * bool(each.kept))
 
 
 def _is_outside(each: ParameterEstimate) -> bool:

@@ -24,11 +24,12 @@ from vedette.cli.running import (
     save_unfinished,
     unchanged_out,
 )
-from vedette.cli.scenario_files import note_assumptions, print_warnings
+from vedette.cli.scenario_files import note_assumptions, print_warnings, write_text
 from vedette.internal.extras import without
 from vedette.internal.text import pluralise
 
 if TYPE_CHECKING:
+    from vedette.evaluation.fit import Fit
     from vedette.evaluation.joining import Join
     from vedette.recorded import RecordedScans
     from vedette.scenarios import Scenario
@@ -61,6 +62,14 @@ JoinTracks = Annotated[
     bool, typer.Option("--join/--no-join", help="Join tracks across gaps, where they are probably of one target.")
 ]
 
+Calibrate = Annotated[
+    bool,
+    typer.Option(
+        "--calibrate",
+        help="First estimate what the sensors file does not give or the fit finds wrong; see `vedette calibrate`.",
+    ),
+]
+
 
 def track(
     scans: ScansFile,
@@ -70,6 +79,7 @@ def track(
     overwrite: Overwrite = False,
     formats: Formats = None,
     join: JoinTracks = True,
+    calibrate: Calibrate = False,
     speed: Speed = 10.0,
     bad_rows: BadRows = "refuse",
     trust: Trust = False,
@@ -79,38 +89,64 @@ def track(
     Prints tracks and diagnostics, and errors if the targets' own reports are given. --out writes tracks, tables and
     figures.
     """
-    from vedette.evaluation.fit import fit_of_run
+    from vedette.cli.calibrating import calibrate_doubtful
+    from vedette.scenarios.from_recording import scenario_from_recording
 
     identity = _check_output(formats or (), out, overwrite)
     recorded, warnings = read_recording(sensors, scans, truth, speed=speed, bad_rows=bad_rows, trust=trust)
-    scenario, recording, assumed = recorded
-    if "clutter" in assumed:
-        note("`vedette calibrate` estimates clutter, noise and detection from the same scans.")
+    if "clutter" in recorded.assumed and not calibrate:
+        note("`--calibrate` estimates clutter, noise and detection from the same scans.")
     on_earth = [name for name in formats or () if name in ON_EARTH]
-    if on_earth and scenario.model.origin is None:  # before a folder with only a part of the output exists
+    if on_earth and recorded.scenario.model.origin is None:  # before a folder with only a part of the output exists
         raise usage_error(f"expected an origin in {sensors}, as {on_earth[0]} has degrees; got none", "--format")
-    written: list[Path] = []
+    text, calibration = None, None
     with interruptible("nothing was written"):
-        record = _run_tracker(scenario, recording)
-        with compiling():
-            fit = fit_of_run(record, scenario)
+        record, fit = _tracked(recorded)
+        if calibrate and (found := calibrate_doubtful(recorded, fit, sensors)):
+            text, calibration = found
+            recorded = scenario_from_recording(sensors, scans, truth, speed=speed, bad_rows=bad_rows, text=text)
+            record, fit = _tracked(recorded)
+        scenario = recorded.scenario
         print_run(record, scenario, fit, len(warnings))
         folder = unchanged_out(out, overwrite, identity)
-        if folder is not None:
-            if missing_package := without("vedette track --out: a folder of results", "pyarrow"):
-                note(f"{missing_package}; the tracks are written without it")
-            else:
-                save_unfinished(record, scenario, fit, folder, overwrite)
+        written = [] if folder is None else _save(record, scenario, fit, folder, text, overwrite=overwrite)
     with interruptible("nothing was written") if folder is None else finishing(folder, "tracks and figures"):
         joins = _print_tracks(record, recorded, scans, join)
         if folder is not None:
-            written = _write_tracks(record, scenario, folder, formats, joins)
+            written += _write_tracks(record, scenario, folder, formats, joins)
             _draw(record, scenario, folder)
     if folder is not None:
         echo(f"Wrote {folder}: {', '.join(_contents(folder, written))}")
-    origin = {"assumptions": assumed, "skipped": recording.skipped, "warnings": warnings}
-    joined = [join._asdict() for join in joins]
-    emit_json({**run_document(record, scenario, fit), **origin, "joins": joined, "folder": folder, "written": written})
+    origin = {"assumptions": recorded.assumed, "skipped": recorded.recording.skipped, "warnings": warnings}
+    more = {"joins": [join._asdict() for join in joins], "calibration": calibration}
+    emit_json({**run_document(record, scenario, fit), **origin, **more, "folder": folder, "written": written})
+
+
+def _tracked(recorded: RecordingScenario) -> tuple[RunRecord, Fit]:
+    """Return the run of the tracker over all scans, and the fit of its model."""
+    from vedette.evaluation.fit import fit_of_run
+
+    record = _run_tracker(recorded.scenario, recorded.recording)
+    with compiling():
+        return record, fit_of_run(record, recorded.scenario)
+
+
+def _save(
+    record: RunRecord, scenario: Scenario, fit: Fit, folder: Path, text: str | None, *, overwrite: bool
+) -> list[Path]:
+    """Write the tables of a run, still without tracks and figures, and its sensors file of this text if calibrated.
+
+    Returns the sensors file, if any.
+    """
+    if missing_package := without("vedette track --out: a folder of results", "pyarrow"):
+        note(f"{missing_package}; the tracks are written without it")
+    else:
+        save_unfinished(record, scenario, fit, folder, overwrite)
+    if text is None:
+        return []
+    folder.mkdir(parents=True, exist_ok=True)
+    write_text(folder / "sensors.yaml", text)
+    return [folder / "sensors.yaml"]
 
 
 def _check_output(formats: Sequence[str], out: Path | None, overwrite: bool) -> tuple[int, ...]:

@@ -125,7 +125,7 @@ def _innovation_findings(fit: SensorFit, components: Sequence[str], num_sensors:
             yield (
                 "bias",
                 f"{_plural(name)} are {_signed(name, mean.value)} off its tracks ({mean.away_from(0.0):.0f} standard "
-                "errors): run `vedette calibrate`",
+                "errors): `vedette track --calibrate` estimates it",
             )
         elif squares.away_from(1.0) <= _SURE or _SPREADS[0] <= spread <= _SPREADS[1]:
             continue
@@ -139,8 +139,8 @@ def _innovation_findings(fit: SensorFit, components: Sequence[str], num_sensors:
             yield (
                 "noise",
                 f"{_plural(name)} spread {_with_two_digits(spread)} times as much about its tracks as noise and motion "
-                f"explain (noise {_with_two_digits(noise * quantity.per_si)} {quantity.unit}): `vedette calibrate` "
-                "estimates it",
+                f"explain (noise {_with_two_digits(noise * quantity.per_si)} {quantity.unit}): `vedette "
+                "track --calibrate` estimates it",
             )
 
 
@@ -162,7 +162,7 @@ def _detection_findings(fit: SensorFit) -> Iterator[tuple[str, str]]:
         yield (
             "detection",
             f"detects its tracks in {assumed + excess.value:.0%} of scans where {assumed:.0%} is assumed: `vedette "
-            "calibrate` estimates `detection`",
+            "track --calibrate` estimates it",
         )
     more = _mean(
         [
@@ -187,7 +187,7 @@ def _clutter_findings(fit: SensorFit, rate: float) -> Iterator[tuple[str, str]]:
         yield (
             "clutter",
             f"{found / fit.num_scans:.2g} measurements a scan lie beside all tracks, where clutter of {rate:.2g} is "
-            "assumed: `vedette calibrate` estimates it",
+            "assumed: `vedette track --calibrate` estimates it",
         )
 
 

@@ -158,7 +158,7 @@ def _parallel_tracks(
     if len(offsets) > _MANY * len(first):
         distance = f"{np.median(offsets):.0f} m from one of {names[1]}"
         finding = f"{len(offsets)} of {len(first)} tracks of {names[0]} keep {distance}, as two tracks of one target do"
-        yield f"{finding}: `vedette calibrate` finds biases of range, bearing, clock and place"
+        yield f"{finding}: `vedette track --calibrate` finds biases of range, bearing and clock"
 
 
 def _nearest_offset(track: _Track, others: list[_Track], sensor_positions: Floats) -> float | None:

@@ -18,8 +18,9 @@ class Quantity(NamedTuple):
 
     units: one of `LENGTHS`, `HEIGHTS`, `ANGLES`, `SPEEDS`. unit: unit in scenario files and messages. per_si: number of
     these units in one SI unit. least: smallest value without noise and bias, SI. most: largest size in a recording, SI,
-    or inf if it is limited like positions. far: standard deviation of measurements with an unknown bias, SI. unknown:
-    standard deviation of a bias above which it counts as not found, in `unit`.
+    or inf if it is limited like positions. far: standard deviation of measurements with an unknown bias, SI.
+    usual_bias, unknown: standard deviations of a bias, in `unit`, before any recording (of lengths, at least
+    `USUAL_SHARE` of the range), and above which it counts as not found.
     """
 
     units: Mapping[str, float]
@@ -28,6 +29,7 @@ class Quantity(NamedTuple):
     least: float
     most: float
     far: float
+    usual_bias: float
     unknown: float
 
     @property
@@ -46,15 +48,16 @@ class Quantity(NamedTuple):
         return "rad" if self.is_angle else self.unit
 
 
-_LENGTH = Quantity(LENGTHS, "m", 1.0, -math.inf, math.inf, 300.0, 1000.0)
+USUAL_SHARE = 0.01  # of the range, prior standard deviation of a bias of lengths
+_LENGTH = Quantity(LENGTHS, "m", 1.0, -math.inf, math.inf, 300.0, 5.0, 1000.0)
 QUANTITIES = {
-    "bearing": Quantity(ANGLES, "deg", 180.0 / math.pi, -math.inf, 2.0 * math.pi, math.radians(3.0), 10.0),
+    "bearing": Quantity(ANGLES, "deg", 180.0 / math.pi, -math.inf, 2.0 * math.pi, math.radians(3.0), 1.0, 10.0),
     "range": _LENGTH._replace(least=0.0),
-    "range_rate": Quantity(SPEEDS, "m/s", 1.0, -math.inf, 1e5, 10.0, 100.0),
+    "range_rate": Quantity(SPEEDS, "m/s", 1.0, -math.inf, 1e5, 10.0, 1.0, 100.0),
     "x": _LENGTH,
     "y": _LENGTH,
-    "elevation": Quantity(ANGLES, "deg", 180.0 / math.pi, -math.inf, math.pi / 2.0, math.radians(3.0), 10.0),
-    "altitude": Quantity(HEIGHTS, "m", 1.0, -math.inf, 1e5, 300.0, 1000.0),
+    "elevation": Quantity(ANGLES, "deg", 180.0 / math.pi, -math.inf, math.pi / 2.0, math.radians(3.0), 1.0, 10.0),
+    "altitude": Quantity(HEIGHTS, "m", 1.0, -math.inf, 1e5, 300.0, 5.0, 1000.0),
 }
 # Those that only a measurement can be biased in; a bias of x, y is also of the place of the sensor.
 ONLY_MEASURED = ("bearing", "range", "range_rate", "elevation", "altitude")

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path as FilePath
 
@@ -11,13 +11,22 @@ import numpy as np
 from vedette.calibration import Calibration, Parameter, Problem
 from vedette.calibration.parameters import with_biases
 from vedette.filters import Limits, SequentialLmbFilter, common_target_model
-from vedette.internal.quantities import COMPONENTS, HEIGHT_DEPENDENT, PLACED, QUANTITIES, in_file, is_position
+from vedette.internal.quantities import (
+    COMPONENTS,
+    HEIGHT_DEPENDENT,
+    PLACED,
+    QUANTITIES,
+    USUAL_SHARE,
+    in_file,
+    is_position,
+)
 from vedette.internal.reading import read_text
 from vedette.internal.unit_warnings import suppress_unit_warnings
 from vedette.kernels.base.types import Floats
 from vedette.models import Bias, Region, SensorModel, TargetModel
 from vedette.models.clutter import at_raw_measurements
 from vedette.recorded import RecordedScans
+from vedette.recorded.extents import places_of
 from vedette.recorded.scan_times import Bearings, sensor_bias
 from vedette.scenarios.build import build_sensors
 from vedette.scenarios.dumping import dump_data
@@ -34,6 +43,8 @@ from vedette.tracking import Central, Tracker
 _LIMITS = Limits(min_existence=1e-3, gate_probability=1.0 - 1e-12, merge_distance=0.5, max_components=20)
 # Standard deviations at and above which a parameter counts as unknown: of clocks, s; of logarithms, of log-odds.
 _UNKNOWN_CLOCK, _UNKNOWN_LOG, _UNKNOWN_ODDS = 5.0, 1.0, 4.0
+_USUAL_CLOCK, _USUAL_NOISE = 1.0, 0.5  # standard deviations before any recording: of clocks, s; of logarithms of noise
+_FAR = 0.9  # quantile of the ranges that a share of is usual as a bias
 _WIDENING = 3.0  # times the region, along each axis: noise at its edge stays in it
 _SUPPORTED_CLUTTER = (
     "region",
@@ -45,7 +56,12 @@ _MIN_RATE, _MAX_PROBABILITY = 0.01, 0.98  # to start from
 
 
 def build_problem(
-    scenario: Scenario, *, position: bool = False, biases: bool = True, bearings: Bearings | None = None
+    scenario: Scenario,
+    *,
+    position: bool = False,
+    biases: bool = True,
+    bearings: Bearings | None = None,
+    prior_scale: float = 1.0,
 ) -> Problem:
     """Return the calibration problem of a recording: its sensors' parameters, to be estimated.
 
@@ -59,6 +75,8 @@ def build_problem(
         position: True to estimate biases of the other sensors' own places, too.
         biases: False to leave out all biases.
         bearings: in which direction the biases of bearings count if there is no recording.
+        prior_scale: factor on the prior standard deviations: 1 degree, 1 s, 1 m/s, and 5 m or 1 % of the range,
+            whichever is wider, for biases; half a unit of the logarithm for noise.
     """
     model, folder = scenario.model, scenario.folder
     sites = tuple(recorded_sensors(model))
@@ -70,8 +88,9 @@ def build_problem(
         if not recording.scans or any(scans[s] is not None for scans in recording.scans):
             clockwise = recording.bearings[s] == "north"
             if biases:
-                parameters += _bias_parameters(s, sensor, sites[s].bias, clockwise, position, only_positions)
-            parameters += _model_parameters(s, sensor)
+                usual = _usual_biases(recording, s, sites[s].kind, model.region.build(), prior_scale)
+                parameters += _bias_parameters(s, sensor, sites[s].bias, clockwise, position, only_positions, usual)
+            parameters += _model_parameters(s, sensor, prior_scale)
     filters = [sensor.filter for sensor in build_sensors(scenario)]
     targets = _births_per_scan(common_target_model(filters), recording.times)
     region, method = model.region.build(), model.filter.gaussian_method
@@ -165,9 +184,18 @@ def _widen_region(region: Region) -> Region:
 
 
 def _bias_parameters(
-    s: int, sensor: Sensor, given: Bias, clockwise: bool, position: bool, only_positions: bool
+    s: int,
+    sensor: Sensor,
+    given: Bias,
+    clockwise: bool,
+    position: bool,
+    only_positions: bool,
+    usual: Mapping[str, float],
 ) -> Iterator[Parameter]:
-    """Return the biases of a sensor: of its measurement, its clock and, with `position`, its place."""
+    """Return the biases of a sensor: of its measurement, its clock and, with `position`, its place.
+
+    usual: prior standard deviations.
+    """
     components = COMPONENTS[sensor.measurement.kind]
     names = [*components]
     if s > 0:  # a common shift in time, shift in space or turn of all sensors changes nothing
@@ -178,16 +206,35 @@ def _bias_parameters(
         names.remove("bearing")
     for name in names:
         if name == "clock":
-            yield Parameter(s, "bias", name, name, "s", given.clock, 1.0, "plain", _UNKNOWN_CLOCK)
+            yield Parameter(s, "bias", name, name, "s", given.clock, 1.0, "plain", _UNKNOWN_CLOCK, usual[name])
             continue
         quantity = QUANTITIES[name]
         start, per_si = getattr(given, name) * quantity.per_si, quantity.per_si
         per_si = -per_si if clockwise and quantity.is_angle else per_si
-        yield Parameter(s, "bias", name, in_file(name), quantity.unit, start, per_si, "plain", quantity.unknown)
+        yield Parameter(
+            s, "bias", name, in_file(name), quantity.unit, start, per_si, "plain", quantity.unknown, usual[name]
+        )
 
 
-def _model_parameters(s: int, sensor: Sensor) -> Iterator[Parameter]:
-    """Return the parameters of noise, detection and clutter that the sections give as numbers."""
+def _usual_biases(recording: RecordedScans, s: int, kind: str, region: Region, scale: float) -> dict[str, float]:
+    """Return the prior standard deviation of each bias of a sensor, in its unit; wider for lengths if it sees far."""
+    rows = [
+        np.hypot(*(places_of(scan, poses[s], kind) - poses[s, :2]).T)
+        for scans, poses in zip(recording.scans, recording.poses, strict=True)
+        if (scan := scans[s]) is not None
+    ]
+    sides = region.x_max - region.x_min, region.y_max - region.y_min  # without measurements, they count
+    ranges = np.concatenate(rows) if sum(map(len, rows)) else np.array([max(sides)])
+    far = USUAL_SHARE * float(np.quantile(ranges, _FAR))
+    usual = {name: max(each.usual_bias, far if each.unit == "m" else 0.0) for name, each in QUANTITIES.items()}
+    return {name: scale * std for name, std in {**usual, "clock": _USUAL_CLOCK}.items()}
+
+
+def _model_parameters(s: int, sensor: Sensor, scale: float) -> Iterator[Parameter]:
+    """Return the parameters of noise, detection and clutter that the sections give as numbers.
+
+    scale: factor on the prior standard deviation of noise.
+    """
     noise, components = sensor.noise, COMPONENTS[sensor.measurement.kind]
     for i, component in enumerate(components):
         quantity = QUANTITIES[component]
@@ -198,7 +245,9 @@ def _model_parameters(s: int, sensor: Sensor) -> Iterator[Parameter]:
         elif noise.kind in ("constant", "by_axis"):
             name, start = f"std.{i}", noise.std[i]
         if name:
-            yield Parameter(s, "noise", component, f"noise.{name}", unit, start, per_si, "log", _UNKNOWN_LOG)
+            yield Parameter(
+                s, "noise", component, f"noise.{name}", unit, start, per_si, "log", _UNKNOWN_LOG, scale * _USUAL_NOISE
+            )
     if (probability := getattr(sensor.detection, "probability", None)) is not None:
         start = min(max(probability, 1.0 - _MAX_PROBABILITY), _MAX_PROBABILITY)
         yield Parameter(s, "detection", "", "detection.probability", "", start, 1.0, "logit", _UNKNOWN_ODDS)
@@ -223,21 +272,21 @@ def _with_values(
     return tuple(updated)
 
 
-def calibrated_text(scenario: Scenario, sensors: FilePath, calibration: Calibration, folder: FilePath) -> str:
+def calibrated_text(scenario: Scenario, sensors: FilePath, calibration: Calibration, folder: FilePath | None) -> str:
     """Return the sensors file with the estimates.
 
-    Parameters that are not identifiable keep their values; comments are lost. If the optimiser did not converge, so do
+    Parameters without a better estimate keep their values; comments are lost. If the optimiser did not converge, so do
     all parameters, and the first line is a comment.
 
     Args:
         scenario: of the recording.
         sensors: the sensors file that the scenario was made with.
         calibration: the estimates.
-        folder: of the new file; if it is not that of the old one, files that it names get absolute paths.
+        folder: of the new file; if it is not that of the old one, files that it names get absolute paths. None: any.
     """
     data = dict(read_yaml(read_text(sensors, "sensors file", MAX_BYTES), str(sensors)).data)
     biases = [sensor.bias.model_dump(exclude_defaults=True) for sensor in scenario.model.sensors]
-    found = [each for each in calibration.estimates if calibration.converged and not each.reason]
+    found = [each for each in calibration.estimates if calibration.converged and each.is_better]
     parameters = [each.parameter for each in found]
     values = [float(f"{each.value:.7g}") for each in found]  # far more digits than are accurate
     for each, value in zip(parameters, values, strict=True):
@@ -251,5 +300,6 @@ def calibrated_text(scenario: Scenario, sensors: FilePath, calibration: Calibrat
         }
         for given, section, bias in zip(data["sensors"], sections, biases, strict=True)
     ]
-    text = dump_data(data, None if folder.resolve() == sensors.parent.resolve() else sensors.parent)
+    is_same = folder is not None and folder.resolve() == sensors.parent.resolve()
+    text = dump_data(data, None if is_same else sensors.parent)
     return text if calibration.converged else f"{_NOT_CONVERGED}\n{text}"

@@ -32,7 +32,13 @@ class RecordingScenario(NamedTuple):
 
 
 def scenario_from_recording(
-    sensors: FilePath, scans: FilePath, truth: FilePath | None = None, *, speed: float = 10.0, bad_rows: str = "refuse"
+    sensors: FilePath,
+    scans: FilePath,
+    truth: FilePath | None = None,
+    *,
+    speed: float = 10.0,
+    bad_rows: str = "refuse",
+    text: str | None = None,
 ) -> RecordingScenario:
     """Return the scenario of recorded scans.
 
@@ -43,6 +49,7 @@ def scenario_from_recording(
         truth: the file of the targets' own reports; None: as in the sensors file, or unknown.
         speed: m/s that targets hardly exceed; motion and births are derived from it unless they are given.
         bad_rows: "refuse" or "skip", see `vedette.recorded.Conventions`.
+        text: contents of the sensors file; None: those on disk.
 
     Raises:
         InputError: a file that does not exist, or rows that cannot be read.
@@ -51,7 +58,7 @@ def scenario_from_recording(
     for file, content in ((scans, "scans"), (truth, "the targets' reports")):
         if file is not None and (file.is_dir() or not file.exists()):
             raise InputError(f"{file}: {'a folder' if file.is_dir() else 'no such file'}; expected a file of {content}")
-    document = read_sensors_file(sensors)
+    document = read_sensors_file(sensors, text)
     given = {key: value for key, value in document.data.items() if key not in ("control", "planners", "time")}
     control, section = document.data.get("control"), given.get("recording")
     if isinstance(control, Mapping) and "constraints" in control:  # zones are drawn

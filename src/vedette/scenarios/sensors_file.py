@@ -129,9 +129,12 @@ def _not_given(given: Mapping[str, Any]) -> tuple[str, ...]:
     return (*(name for name in _ASSUMED if name not in given), *(() if has_clutter else ("clutter",)))
 
 
-def read_sensors_file(sensors: FilePath) -> Document:
-    """Read a sensors file; raises `InputError` if it is no mapping, or has `heading_deg` but counts from north."""
-    document = read_yaml(read_text(sensors, "sensors file", MAX_BYTES), str(sensors))
+def read_sensors_file(sensors: FilePath, text: str | None = None) -> Document:
+    """Read a sensors file; raises `InputError` if it is no mapping, or has `heading_deg` but counts from north.
+
+    text: its contents; None: those of the file.
+    """
+    document = read_yaml(read_text(sensors, "sensors file", MAX_BYTES) if text is None else text, str(sensors))
     if not isinstance(document.data, Mapping):
         raise InputError(f"{sensors}: expected a mapping with `sensors`; got {describe(document.data)}")
     if "time" not in document.data and (paths := headings_beside_north(document.data)):
