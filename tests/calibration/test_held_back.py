@@ -42,7 +42,7 @@ def test_a_group_that_explains_nothing_gains_nothing() -> None:
             return -0.5 * (came - factors @ x) ** 2
 
         maximum = maximise(terms, np.zeros(2), np.full(2, 10.0), [[0, 1]], BLOCKS)
-        cov = np.linalg.inv(factors.T @ factors)
+        cov: Floats = np.asarray(np.linalg.inv(factors.T @ factors), np.float64)
         gains = held_back_gains(terms, maximum, cov, np.zeros(2), [[0], [1]], BLOCKS)
         gained += [gain > error for gain, error in gains]
     assert gained[0] == 30
@@ -52,7 +52,8 @@ def test_a_group_that_explains_nothing_gains_nothing() -> None:
 def test_halves_are_scored_as_if_each_were_fitted_alone() -> None:
     """Of a regression, a Newton step from the maximum of all is the maximum of the half."""
     factors, came = regression(0)
-    best, cov = np.linalg.lstsq(factors, came)[0], np.linalg.inv(factors.T @ factors)
+    best: Floats = np.asarray(np.linalg.lstsq(factors, came)[0], np.float64)
+    cov: Floats = np.asarray(np.linalg.inv(factors.T @ factors), np.float64)
 
     def terms(x: Floats) -> Floats:
         return -0.5 * (came - factors @ x) ** 2

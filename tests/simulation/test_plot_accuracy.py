@@ -30,6 +30,7 @@ from vedette.models.functions import numbers_at
 from vedette.models.pose_noise import PoseStds, pose_noise
 from vedette.recorded import Conventions, Origin, RecordedSensor, parse_scans
 from vedette.recorded.merging import merged
+from vedette.recorded.returns import Extent
 from vedette.recorded.tables import as_table
 from vedette.scenarios.from_recording import scenario_from_recording
 
@@ -119,10 +120,14 @@ def test_a_bias_is_removed_and_the_accuracy_stays() -> None:
 def test_rows_of_one_target_are_merged_with_their_mean_covariance() -> None:
     columns = ROWS | {"bearing_rad": [0.5, 0.501, None], "range_km": [1.0, 1.01, None]}
     recording = parse_scans(as_table(columns), [RADAR], EAST)
-    (scan,) = merged(recording, [RADAR], [(0.02, 30.0)], 4.0).scans[0]
+    (scan,) = merged(recording, [RADAR], [Extent(30.0, "as given")]).scans[0]
     assert scan is not None
     before: Any = recording.scans[0][0]
-    np.testing.assert_allclose(scan, before.mean(axis=0, keepdims=True))
+    places = before[:, 1:2] * np.column_stack([np.cos(before[:, 0]), np.sin(before[:, 0])])
+    mean = before.mean(axis=0)
+    variance = ((places - mean[1] * np.array([math.cos(mean[0]), math.sin(mean[0])])) ** 2).mean()
+    grown = mean + np.array([0.0, 0.0, variance / mean[1] ** 2, 0.0, variance, 0.0])
+    np.testing.assert_allclose(scan, grown[np.newaxis])
 
 
 def test_rows_may_lack_an_altitude() -> None:

@@ -24,6 +24,7 @@ from vedette.live.messages import read_message
 from vedette.models import BirthModel, ClassFeatures, with_row_noise
 from vedette.recorded import Conventions, RecordedSensor, parse_scans
 from vedette.recorded.merging import merged
+from vedette.recorded.returns import Extent
 from vedette.recorded.tables import as_table
 from vedette.scenarios.from_recording import scenario_from_recording
 from vedette.simulation import load_run, save_run
@@ -111,11 +112,12 @@ def test_merged_rows_have_the_mean_ratio_and_a_class_only_if_they_agree() -> Non
     for reports, expected in ((["large"] * 3, 1.0), (["small", "large", "large"], np.nan)):
         recording = parse_scans(as_table(columns | {"class": [*reports, None]}), [PLACE], Conventions({}, {}))
         before: Any = recording.scans[0][0]
-        found = merged(recording, [PLACE], [(20.0, 20.0)], 4.0)
+        found = merged(recording, [PLACE], [Extent(10.0, "as given")])
         scan, accuracy = (each[0][0] for each in (found.scans, found.accuracy))
         assert scan is not None
         assert accuracy is not None
-        np.testing.assert_allclose(scan, before.mean(axis=0, keepdims=True))
+        kept = [0, 1, *range(5, before.shape[1])]  # all but the noise, which grows by the spread
+        np.testing.assert_allclose(scan[:, kept], before[:, kept].mean(axis=0, keepdims=True))
         np.testing.assert_array_equal(accuracy[:, 0], [expected])
 
 

@@ -96,7 +96,7 @@ def _tested(
     models: Sequence[ReturnsModel],
     others: Sequence[int],
 ) -> Iterator[tuple[float, Extent]]:
-    """Yield log likelihood ratios of extents of a sensor, in order of the distance. others: sensors beside it."""
+    """Yield log likelihood ratios and extents of a sensor, in order of distance. others: indices of further sensors."""
     own = _searched(scans[s])
     joins = [linkage(x.places, "single") if 1 < len(x.places) <= _MOST_RETURNS else np.empty((0, 4)) for x in own]
     heights = np.concatenate([each[:, 2] for each in joins] or [np.empty(0)])
@@ -182,7 +182,7 @@ def _by_next_scans(scans: Sequence[_Scan], groups: Sequence[Ints], probability: 
 
 
 def _chains(scans: Sequence[_Scan], groups: Sequence[Ints]) -> list[list[int]]:
-    """Return the sizes of groups over at most ten successive scans in each of which they are nearest to each other."""
+    """Return the sizes of groups over at most ten successive scans as long as they stay nearest to each other."""
     ended, open_chains, before = list[list[int]](), list[list[int]](), np.empty((0, 2))
     for k, (scan, own) in enumerate(zip(scans, groups, strict=True)):
         centres, sizes = _centres(scan, own)
