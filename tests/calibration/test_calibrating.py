@@ -294,11 +294,9 @@ def test_radar_position_is_estimated_from_surrounding_targets(tmp_path: Path) ->
     targets = [(2000.0, 3000.0, 5.0, 3.0), (-3000.0, 1000.0, -4.0, 4.0), (1000.0, -3000.0, 3.0, -6.0)]
     calibration = biases_of(two_radars(tmp_path, targets))
     found = {(each.parameter.sensor, each.parameter.name): each for each in calibration.estimates}
-    assert (calibration.rank, len(found)) == (5, 6)
-    assert (
-        found[1, "clock"].reason
-        == "not identifiable: the targets that other sensors observe too hardly move in so short a time"
-    )
+    assert len(found) == 6
+    assert found[1, "clock"].kept.startswith("held-back scans fit no better")  # the targets hardly move
+    assert found[1, "clock"].std > 2.0
     for name, truth in (("x", 80.0), ("y", -60.0), ("range", 0.0), ("bearing_deg", 0.0)):
         one = found[1, name]
         assert abs(one.value - truth) < 3.0 * one.std, name

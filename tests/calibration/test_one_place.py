@@ -92,7 +92,7 @@ def test_the_range_of_one_radar_at_rest_is_not_reported(tmp_path: Path) -> None:
 def test_a_radar_that_weaves_finds_its_range(tmp_path: Path) -> None:
     found = by_name(calibration_of(tmp_path, [weaving], [(150.0, 0.0)]))
     one = found[0, "range"]
-    assert one.std < 40.0
+    assert one.std < 60.0  # of eight blocks of time
     assert abs(one.value - 150.0) < 3.0 * one.std
 
 

@@ -194,6 +194,7 @@ def _judged(
     cov, lost: results of `covariance`. apart: sensors that share no targets with the others. blocks: of the terms.
     """
     found, stds = [], np.maximum(np.sqrt(np.diag(cov)), stds_from_blocks(maximum.scores, cov, blocks))
+    stds = np.maximum(stds, maximum.stds)
     for i, (each, free) in enumerate(zip(problem.parameters, maximum.at.tolist(), strict=True)):
         partners = [j for j in np.flatnonzero(np.abs(lost[i]) > _PART).tolist() if j != i]
         compared = each.kind == "bias" and each.sensor in apart and each.component in _COMPARED

@@ -21,10 +21,11 @@ _ENOUGH = 0.4  # convergence: largest further step, in standard errors
 _JUMPS = 0.6  # the same where no share of it raises the sum, as the terms may jump
 _NEAR = 4.0  # the same, below which the curvature is not computed again
 _RAISED = 1.0  # log likelihood that twice a step must gain
-_MOST_STEPS = 8
+_MOST_STEPS = 12
 _SHARES = (1.0, 0.5, 0.25, 0.1)  # fractions of a step to try
 _TELLING = 4.0  # eigenvalue of the information, in units of `unknown`, above which a direction is determined
 _WEAK = 25.0  # eigenvalue below which the curvature along a direction is computed
+_CORRELATED = 0.3  # correlation above which second derivatives of a pair are computed
 _REFINEMENTS = 3
 _ALIKE = 1.5  # largest ratio of the curvature over a step and the curvature that chose the step
 
@@ -33,13 +34,15 @@ class Maximum(NamedTuple):
     """Maximum over p parameters on their scales.
 
     at: (p,) parameters. terms: (num_terms,) there. scores: (num_terms, p) their derivatives. information: (p, p) minus
-    the second derivatives of the sum. converged: whether a further step promises next to nothing.
+    the second derivatives of the sum. stds: (p,) standard deviations if correlations are by second derivatives.
+    converged: whether a further step promises next to nothing.
     """
 
     at: Floats
     terms: Floats
     scores: Floats
     information: Floats
+    stds: Floats
     converged: bool
 
     @property
@@ -118,6 +121,7 @@ def maximise(
         if far:  # wide steps smooth jumps, but stay near the maximum where parameters are correlated
             search.steps = errors / stds / np.sqrt(np.diag(information + prior))
         way = bounded @ scores.sum(axis=0)
+        way /= max(1.0, float(np.abs(way / unknown).max()))  # a quadratic is no model farther away
         size = float(np.abs(way / errors).max())
         if converged := size < _ENOUGH:
             break
@@ -127,7 +131,8 @@ def maximise(
                 break
             size = np.inf  # one-sided differences may be too inexact
     refined = _refined(terms, search.at, search.values.sum(), information, unknown)
-    return Maximum(search.at, search.values, scores, refined, converged)
+    wide = _stds_by_differences(terms, search.at, information, bounded, unknown)
+    return Maximum(search.at, search.values, scores, refined, wide, converged)
 
 
 def _information(scores: Floats, bends: Floats, unknown: Floats, groups: Sequence[Sequence[int]]) -> Floats:
@@ -140,6 +145,21 @@ def _information(scores: Floats, bends: Floats, unknown: Floats, groups: Sequenc
         same[np.ix_(group, group)] = True
     scale = np.sqrt(sizes / np.diag(products))
     return np.asarray(np.where(same, products, 0.0) * np.outer(scale, scale))
+
+
+def _stds_by_differences(terms: Terms, at: Floats, information: Floats, cov: Floats, unknown: Floats) -> Floats:
+    """(p,) standard deviations if entries of correlated parameters are differences over two conditional deviations.
+
+    Scores do not show these correlations well, above all those of a clock: the sum jumps where the order of scans
+    changes. cov: (p, p) covariance by the scores.
+    """
+    steps, found = np.diag(2.0 / np.sqrt(np.diag(information))), information.copy()
+    correlations = np.tril(cov / np.sqrt(np.outer(np.diag(cov), np.diag(cov))), -1)
+    for i, j in np.argwhere(np.abs(correlations) > _CORRELATED).tolist():
+        sides = [a * b * float(terms(at + a * steps[i] + b * steps[j]).sum()) for a in (1.0, -1.0) for b in (1.0, -1.0)]
+        found[i, j] = found[j, i] = -sum(sides) / (4.0 * steps[i, i] * steps[j, j])
+    values, vectors = _spectrum(found, unknown)
+    return np.asarray(unknown * np.sqrt((vectors**2 / np.maximum(values, 1.0)).sum(axis=1)))
 
 
 def block_scores(scores: Floats, blocks: Ints) -> Floats:
