@@ -64,8 +64,8 @@ def test_track_estimates_first_what_the_file_does_not_give(place: Path) -> None:
 
 def test_windows_are_printed_side_by_side_and_the_last_is_written(place: Path) -> None:
     write_recording(place, seconds=240.0, biases={"boat": (300.0, 2.0, 0.0)})
-    words = ("calibrate", "scans.csv", "--sensors", "radars.yaml", "--window", "120")
-    words = (*words, "--prior-scale", "3", "--out", "found.yaml")
+    files = ("scans.csv", "--sensors", "radars.yaml", "--out", "found.yaml")
+    words = ("calibrate", *files, "--window", "120", "--prior-scale", "3")
     result = call(*words)
     assert result.exit_code == 0, result.output
     assert "from (s)" in result.stdout
