@@ -16,8 +16,10 @@ from vedette.internal.quantities import QUANTITIES
 from vedette.internal.text import pluralise
 from vedette.kernels.base.types import Floats
 from vedette.models.sensor import SensorModel
+from vedette.recorded.stationary import stationary_places
 from vedette.scenarios import Scenario
 from vedette.scenarios.build import build_sensors
+from vedette.scenarios.sections.recording import recorded_sensors, returns_models
 from vedette.simulation.records import RunRecord
 
 _SURE = 6.0  # standard errors of a finding; of independent blocks, as errors are correlated in time
@@ -28,6 +30,7 @@ _SPREADS = (0.6, 1.5)  # of the assumed standard deviation; no finding within th
 _LEAST_DIFFERENCE = 0.1  # of the share of detected targets
 _RETURNS = 0.1  # further measurements a track and scan
 _LEAST_EXCESS = 0.5  # unexplained measurements a scan above the clutter rate; and as a share of it
+_MANY_PLACES = 3  # stationary places; fewer may be targets at rest
 _EDGE = 3  # matches at each end of a track, which depend on what was detected
 
 
@@ -98,10 +101,30 @@ def fit_of_run(record: RunRecord, scenario: Scenario) -> Fit:
     for name, fit, model in zip(names, fits, models, strict=True):
         findings += (Finding(test, name, f"{name}: {text}") for test, text in _of_sensor(fit, model, len(names)))
     findings += (Finding("fast targets", "", text) for text in unexplained_course_warnings(record, scenario))
+    findings += _stationary_findings(scenario)
     num = sum(len(fit.matches) for fit in fits)
     tests = "bias, noise, motion, detection, several returns, clutter"
-    agreement = ", agreement of sensors, fast targets" if scenario.model.recording is not None else ""
-    return Fit(tuple(findings), f"{tests}{agreement} ({num} pairs of a track and a scan)")
+    if scenario.model.recording is not None:
+        tests += ", agreement of sensors, fast targets, stationary echoes"
+    return Fit(tuple(findings), f"{tests} ({num} pairs of a track and a scan)")
+
+
+def _stationary_findings(scenario: Scenario) -> Iterator[Finding]:
+    """Yield findings of places that a sensor measures all through a recording."""
+    model = scenario.model
+    if model.recording is None:
+        return
+    recording = model.recording.build(model, scenario.folder)
+    for s, (site, own) in enumerate(zip(recorded_sensors(model), returns_models(model), strict=True)):
+        places, masks = stationary_places(recording, s, site, own)
+        if len(places) >= _MANY_PLACES:
+            num = sum(int(mask.sum()) for mask in masks) / len(masks)
+            yield Finding(
+                "stationary echoes",
+                site.name,
+                f"{site.name}: {len(places)} places give {num:.1f} measurements a scan all through the recording, as "
+                "land, buoys and anchored ships do: `recording: {ignore: stationary}` leaves them out",
+            )
 
 
 def _of_sensor(fit: SensorFit, model: SensorModel, num_sensors: int) -> Iterator[tuple[str, str]]:

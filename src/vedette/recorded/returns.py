@@ -51,7 +51,7 @@ class Extent(NamedTuple):
     evidence: str
 
 
-class _Scan(NamedTuple):
+class PlacedScan(NamedTuple):
     """Places of a scan, (num, 2) m, their standard deviations, m, and the place of the sensor."""
 
     time: float
@@ -74,7 +74,7 @@ def extents_of(
 
     Returns must be twice as dense there as around it, or the groups are those of clutter.
     """
-    scans = [_scans(recording, s, site, model) for s, (site, model) in enumerate(zip(sites, models, strict=True))]
+    scans = [placed_scans(recording, s, site, model) for s, (site, model) in enumerate(zip(sites, models, strict=True))]
     found: list[Extent | None] = []
     for s, model in enumerate(models):
         if model.extent is not None:
@@ -90,7 +90,7 @@ def extents_of(
 
 
 def _tested(
-    scans: Sequence[Sequence[_Scan]],
+    scans: Sequence[Sequence[PlacedScan]],
     s: int,
     sites: Sequence[RecordedSensor],
     models: Sequence[ReturnsModel],
@@ -126,7 +126,7 @@ def _cut(joins: Floats, distance: float, num: int) -> Ints:
     return np.asarray(fcluster(joins, distance, "distance"), np.int64) - 1 if len(joins) else np.arange(num)
 
 
-def _scans(recording: RecordedScans, s: int, site: RecordedSensor, model: ReturnsModel) -> list[_Scan]:
+def placed_scans(recording: RecordedScans, s: int, site: RecordedSensor, model: ReturnsModel) -> list[PlacedScan]:
     """Return the scans of a sensor in order of time; none if it measures no places."""
     if site.kind not in PLACED:
         return []
@@ -139,11 +139,11 @@ def _scans(recording: RecordedScans, s: int, site: RecordedSensor, model: Return
         if model.stds is not None:
             across = scan[:, 1] * model.stds[0] if site.kind.startswith("bearing") else model.stds[0]
             stds = np.maximum(across, model.stds[1]) + stds
-        found.append(_Scan(time, places, stds, recording.poses[k, s, :2]))
+        found.append(PlacedScan(time, places, stds, recording.poses[k, s, :2]))
     return found
 
 
-def _searched(scans: Sequence[_Scan]) -> list[_Scan]:
+def _searched(scans: Sequence[PlacedScan]) -> list[PlacedScan]:
     """Return at most a hundred scans, in runs of successive ones that are spread over the recording."""
     if len(scans) <= _MOST_SCANS:
         return list(scans)
@@ -157,14 +157,14 @@ def _is_dense(gaps: Floats, distance: float) -> bool:
     return 3.0 * near >= _DENSER * around
 
 
-def _centres(scan: _Scan, groups: Ints) -> tuple[Floats, Ints]:
+def _centres(scan: PlacedScan, groups: Ints) -> tuple[Floats, Ints]:
     """Return the centres (num, 2) and sizes (num,) of groups."""
     sizes = np.bincount(groups)
     sums = np.column_stack([np.bincount(groups, scan.places[:, axis], len(sizes)) for axis in (0, 1)])
     return sums / np.maximum(sizes, 1)[:, np.newaxis], sizes
 
 
-def _by_next_scans(scans: Sequence[_Scan], groups: Sequence[Ints], probability: float) -> float:
+def _by_next_scans(scans: Sequence[PlacedScan], groups: Sequence[Ints], probability: float) -> float:
     """Return the log likelihood ratio of one target to several from the sizes of groups in successive scans."""
     chains = [np.array(chain, np.float64) for chain in _chains(scans, groups) if max(chain) > 1 and len(chain) > 1]
     if sum(map(len, chains)) < _FEWEST:
@@ -181,7 +181,7 @@ def _by_next_scans(scans: Sequence[_Scan], groups: Sequence[Ints], probability: 
     return one - float(several.max())
 
 
-def _chains(scans: Sequence[_Scan], groups: Sequence[Ints]) -> list[list[int]]:
+def _chains(scans: Sequence[PlacedScan], groups: Sequence[Ints]) -> list[list[int]]:
     """Return the sizes of groups over at most ten successive scans as long as they stay nearest to each other."""
     ended, open_chains, before = list[list[int]](), list[list[int]](), np.empty((0, 2))
     for k, (scan, own) in enumerate(zip(scans, groups, strict=True)):
@@ -200,7 +200,7 @@ def _chains(scans: Sequence[_Scan], groups: Sequence[Ints]) -> list[list[int]]:
 
 
 def _by_other(
-    scans: Sequence[_Scan], groups: Sequence[Ints], others: Sequence[_Scan], reach: float, probability: float
+    scans: Sequence[PlacedScan], groups: Sequence[Ints], others: Sequence[PlacedScan], reach: float, probability: float
 ) -> float:
     """Return the log likelihood ratio of one target to several from the numbers of returns of another sensor."""
     times = np.array([scan.time for scan in others])

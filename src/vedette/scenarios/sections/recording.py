@@ -74,6 +74,11 @@ class RecordingSection(Section):
         description="Whether a scan of a sensor with a regular period is taken for empty where it has no row; not for "
         "sensors with rows of empty cells, in gaps that are outages, or where rows come by target [-].",
     )
+    ignore: Literal["none", "stationary"] = Field(
+        default="none",
+        description="Whether measurements of places that are measured all through the recording are left out, such as "
+        "those of land, buoys and anchored ships [-].",
+    )
     bad_rows: Literal["refuse", "skip"] = Field(
         default="refuse", description="Whether a row that cannot be read is an error, or left out and told of [-]."
     )
@@ -95,7 +100,7 @@ class RecordingSection(Section):
         sites = recorded_sensors(world)
         if as_told:
             sites = [replace(site, bias=NO_BIAS) for site in sites]
-        return _read(str(file), changed, self.model_dump_json(), tuple(sites), tuple(_returns(world)), origin)
+        return _read(str(file), changed, self.model_dump_json(), tuple(sites), returns_models(world), origin)
 
 
 @lru_cache(maxsize=4)
@@ -112,22 +117,27 @@ def _read(
     from vedette.recorded.files import read_table
     from vedette.recorded.merging import merged
     from vedette.recorded.returns import extents_of
+    from vedette.recorded.stationary import without_stationary
 
     own = RecordingSection.model_validate_json(section)
     conventions = Conventions(own.columns, own.units, own.bearings, own.scan_window, own.bad_rows, own.empty_scans)
     recording = parse_scans(read_table(file, sha256=own.sha256), sites, conventions, origin)
+    if own.ignore == "stationary":
+        recording = without_stationary(recording, sites, returns)
     return merged(recording, sites, extents_of(recording, sites, returns))
 
 
-def _returns(world: ScenarioModel) -> Iterator[ReturnsModel]:
-    """Yield for each sensor its extent, or the assumed parameters that an extent is learnt from."""
+def returns_models(world: ScenarioModel) -> tuple[ReturnsModel, ...]:
+    """Return for each sensor its extent, or the assumed parameters that an extent is learnt from."""
     from vedette.recorded.returns import ReturnsModel
 
+    found = list[ReturnsModel]()
     learnt = world.recording is not None and world.recording.extents == "found"
     for sensor in world.sensors:
         extent = sensor.extent if sensor.extent is not None or learnt else 0.0
         probability = float(getattr(sensor.detection, "probability", _ASSUMED_DETECTION))
-        yield ReturnsModel(extent, noise_stds(sensor), probability)
+        found.append(ReturnsModel(extent, noise_stds(sensor), probability))
+    return tuple(found)
 
 
 def noise_stds(sensor: Sensor) -> tuple[float, ...] | None:

@@ -1,0 +1,86 @@
+"""Places that are measured all through a recording: found, named by the fit, and left out where that is asked for."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from vedette.evaluation.fit import fit_of_run
+from vedette.evaluation.runs import run_scenario
+from vedette.kernels.base.types import Floats
+from vedette.recorded import RecordedScans, RecordedSensor
+from vedette.recorded.returns import ReturnsModel
+from vedette.recorded.stationary import stationary_places, without_stationary
+from vedette.scenarios.from_recording import scenario_from_recording
+from vedette.scenarios.warnings import scenario_warnings
+
+LAND = np.array([[-2000.0, 500.0 * k - 1800.0] for k in range(8)])
+SITE = RecordedSensor("R", "bearing_range", (0.0, 0.0, 0.0))
+MODEL = ReturnsModel(0.0, (0.01, 15.0), 0.9)
+
+
+def scans_of(rng: np.random.Generator, land: Floats, clutter: float, poses: Floats) -> RecordedScans:
+    """Two ships, one of which anchors at half-time, and echoes of land, each seen in 3 of 10 scans."""
+    scans = []
+    for k, pose in enumerate(poses):
+        ships = np.array([[1500.0 - 8.0 * k, 900.0], [400.0, min(15.0 * k, 1500.0) - 800.0]])
+        places = np.concatenate([ships[rng.random(2) < 0.9], land[rng.random(len(land)) < 0.3]])
+        false = rng.uniform(-3000.0, 3000.0, (rng.poisson(clutter), 2))
+        away = np.concatenate([places, false]) - pose[:2]
+        polar = np.column_stack([np.arctan2(away[:, 1], away[:, 0]), np.hypot(*away.T)])
+        polar[:, 1] += rng.normal(0.0, 15.0, len(polar))
+        polar[:, 0] += rng.normal(0.0, 0.005, len(polar))
+        scans.append((polar,))
+    times = 2.5 * np.arange(len(poses))
+    return RecordedScans(times, 0.0, False, tuple(scans), poses[:, np.newaxis], (), ("east",))
+
+
+@pytest.mark.parametrize("speed", [0.0, 4.0])
+def test_places_on_the_ground_are_found_and_left_out(speed: float) -> None:
+    poses = np.column_stack([np.full(200, 100.0), speed * np.arange(200.0), np.zeros(200)])
+    recording = scans_of(np.random.default_rng(1), LAND, 2.0, poses)
+    places, masks = stationary_places(recording, 0, SITE, MODEL)
+    assert len(places) == len(LAND)
+    assert np.linalg.norm(places[:, np.newaxis] - LAND, axis=2).min(axis=1).max() < 10.0
+    share = sum(int(mask.sum()) for mask in masks) / (0.3 * 200 * len(LAND))
+    assert share == pytest.approx(1.0, abs=0.1)  # neither ship is left out, the anchored one included
+    found = without_stationary(recording, [SITE], [MODEL])
+    assert found.num_measurements == recording.num_measurements - sum(int(mask.sum()) for mask in masks)
+    assert found.notes[0].endswith("measurements at 8 places that are measured all through are left out")
+
+
+@pytest.mark.parametrize("clutter", [0.2, 5.0, 100.0])
+@pytest.mark.parametrize("seed", range(3))
+def test_moving_targets_and_clutter_are_no_places(clutter: float, seed: int) -> None:
+    recording = scans_of(np.random.default_rng(seed), LAND[:0], clutter, np.zeros((150, 3)))
+    assert len(stationary_places(recording, 0, SITE, MODEL)[0]) == 0
+
+
+def test_the_fit_names_them_and_a_setting_leaves_them_out(tmp_path: Path) -> None:
+    rng, rows, truth = np.random.default_rng(2), ["time,sensor,x,y"], ["time,id,x,y"]
+    for k in range(100):
+        ship = np.array([1500.0 - 20.0 * k, 900.0])
+        truth.append(f"{2.5 * k},0,{ship[0]},{ship[1]}")
+        seen = np.concatenate([ship[np.newaxis][: int(rng.random() < 0.9)], LAND[rng.random(len(LAND)) < 0.3]])
+        rows += [f"{2.5 * k},C,{x},{y}" for x, y in seen + rng.normal(0.0, 15.0, seen.shape)] or [f"{2.5 * k},C,,"]
+    (tmp_path / "scans.csv").write_text("\n".join([*rows, ""]), "utf-8")
+    (tmp_path / "truth.csv").write_text("\n".join([*truth, ""]), "utf-8")
+    text = (
+        "sensor_defaults:\n  measurement: {kind: position}\n  noise: {kind: constant, std: [15.0, 15.0]}\n"
+        "  detection: {kind: constant, probability: 0.9}\nsensors: [{name: C, position: [0.0, 0.0]}]\n"
+    )
+    numbers = []
+    for more in ("", "recording: {ignore: stationary}\n"):
+        (tmp_path / "sensors.yaml").write_text(more + text, "utf-8")
+        scenario = scenario_from_recording(
+            tmp_path / "sensors.yaml", tmp_path / "scans.csv", tmp_path / "truth.csv"
+        ).scenario
+        record = run_scenario(scenario, "stationary", seed=0)
+        numbers.append(np.mean([len(each.labels) for each in record.estimates[10:]]))
+        tests = [each.test for each in fit_of_run(record, scenario).findings]
+        assert ("stationary echoes" in tests) is (not more)
+        assert any("are left out" in line for line in scenario_warnings(scenario)) is bool(more)
+    assert numbers[0] > 2.0
+    assert numbers[1] == pytest.approx(1.0, abs=0.1)
