@@ -15,7 +15,7 @@ from vedette.recorded.returns import ReturnsModel, groups, placed_scans
 from vedette.recorded.scan_times import RecordedScans, RecordedSensor
 
 _REACH = 3.0  # standard deviations of a measurement of a place around it
-_PARTS = 10  # of the recording, in nearly each of which a stationary place is measured
+_PARTS = 10  # of the recording; a stationary place is measured in nearly all
 _SCANS_A_PART = 8  # at least; a shorter recording shows nothing
 _PRESENT = 0.8  # share of the parts, with the first and the last
 _DENSER = 3.0  # times as many measurements in each half as in the ring up to three times as far, for the same area
@@ -26,7 +26,7 @@ _MOST = 5000  # measurements that are searched
 def stationary_places(
     recording: RecordedScans, s: int, site: RecordedSensor, model: ReturnsModel
 ) -> tuple[Floats, list[Bools]]:
-    """Return the (num, 2) places that a sensor measures all through a recording, and which measurements are of them.
+    """Return the (num, 2) places that a sensor measures all through a recording, and the measurements of them.
 
     The latter are (num_measurements,) for each scan of the sensor. Places are on the ground, also of a sensor that
     moves. Ships that arrive and anchor are no such place, as they miss in the first part of the recording.
