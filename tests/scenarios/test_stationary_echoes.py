@@ -33,7 +33,7 @@ def scans_of(rng: np.random.Generator, land: Floats, clutter: float, poses: Floa
         polar[:, 1] += rng.normal(0.0, 15.0, len(polar))
         polar[:, 0] += rng.normal(0.0, 0.005, len(polar))
         scans.append((polar,))
-    times = 2.5 * np.arange(len(poses))
+    times = np.asarray(2.5 * np.arange(len(poses)), np.float64)
     return RecordedScans(times, 0.0, False, tuple(scans), poses[:, np.newaxis], (), ("east",))
 
 

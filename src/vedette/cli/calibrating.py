@@ -16,9 +16,9 @@ from vedette.cli.compiling import compiling
 from vedette.cli.errors import check_ending
 from vedette.cli.options import BadRows, Overwrite, ScansFile, SensorsFile, Speed, Trust
 from vedette.cli.output import console, echo, emit_json, note
+from vedette.cli.recordings import read_recording
 from vedette.cli.running import interruptible
 from vedette.cli.scenario_files import write_text
-from vedette.cli.tracking import read_recording
 from vedette.errors import InputError
 
 if TYPE_CHECKING:

@@ -12,11 +12,11 @@ from vedette.cli.compiling import compiling
 from vedette.cli.completing import one_of
 from vedette.cli.documents import run_document
 from vedette.cli.errors import usage_error
-from vedette.cli.options import BAD_ROWS, BadRows, Overwrite, ScansFile, SensorsFile, Speed, Trust
+from vedette.cli.options import BadRows, Overwrite, ScansFile, SensorsFile, Speed, Trust
 from vedette.cli.output import bar, echo, emit_json, note
+from vedette.cli.recordings import read_recording
 from vedette.cli.run_summary import print_run
 from vedette.cli.running import (
-    CodeTrust,
     check_out,
     end_stopped,
     finishing,
@@ -24,7 +24,7 @@ from vedette.cli.running import (
     save_unfinished,
     unchanged_out,
 )
-from vedette.cli.scenario_files import note_assumptions, print_warnings, write_text
+from vedette.cli.scenario_files import write_text
 from vedette.internal.extras import without
 from vedette.internal.text import pluralise
 
@@ -38,7 +38,6 @@ if TYPE_CHECKING:
 
 FORMATS = ("csv", "geojson", "parquet", "czml", "mcap")
 ON_EARTH = ("geojson", "czml", "mcap")
-_SHOWN_ROWS = 5
 _MIN_ESTIMATES = 10  # smallest number of estimates of a lasting track
 
 TruthFile = Annotated[
@@ -185,25 +184,6 @@ def _write_tracks(
     for path in written:
         write_tracks(path, table)
     return written
-
-
-def read_recording(
-    sensors: Path, scans: Path, truth: Path | None, *, speed: float, bad_rows: str, trust: bool
-) -> tuple[RecordingScenario, list[str]]:
-    """Return the scenario of recorded scans and its warnings; print skipped rows, assumptions and code that runs."""
-    from vedette.scenarios.from_recording import scenario_from_recording
-
-    if bad_rows not in BAD_ROWS:
-        raise usage_error(f"expected one of {', '.join(BAD_ROWS)}; got {bad_rows!r}", "--bad-rows")
-    recorded = scenario_from_recording(sensors, scans, truth, speed=speed, bad_rows=bad_rows)
-    CodeTrust(trust)(recorded.scenario)
-    warnings = print_warnings(recorded.scenario)
-    for text in recorded.recording.skipped[:_SHOWN_ROWS]:
-        note(f"skipped: {text}")
-    if len(recorded.recording.skipped) > _SHOWN_ROWS:
-        note(f"skipped: {len(recorded.recording.skipped) - _SHOWN_ROWS} more rows")
-    note_assumptions(recorded.assumed, sensors)
-    return recorded, warnings
 
 
 def _contents(out: Path, written: list[Path]) -> list[str]:
