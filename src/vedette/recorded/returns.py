@@ -66,8 +66,8 @@ def extents_of(
     """Return the extent of targets for each sensor; None where its measurements are of a target each.
 
     Returns within a distance of each other are of targets with one return each that are detected independently, or of
-    one target. The second holds at the distance with the largest log likelihood ratio, if that is 20 or more. Ratios are
-    of the numbers of returns of another sensor at the same place and time: one of one target, a binomial number of n
+    one target. The second holds at the distance with the largest log likelihood ratio, if that is 20 or more. It is
+    that of the numbers of returns of another sensor there at the time: one of one target, a binomial number of n
     targets. And of the sensor itself in its next scans: Poisson numbers of one target, binomial numbers of n targets.
 
     Returns must be twice as dense there as around it, or the groups are those of clutter.
