@@ -148,3 +148,21 @@ def test_clutter_alone_is_not_taken_for_fast_targets(tmp_path: Path) -> None:
     (tmp_path / "radar.yaml").write_text(SENSORS % "", "utf-8")
     found = scenario_from_recording(tmp_path / "radar.yaml", tmp_path / "scans.csv")
     assert unexplained_course_warnings(run_scenario(found.scenario, "stationary", seed=0), found.scenario) == ()
+
+
+def test_a_camera_is_read_with_a_radar_and_refused_alone(tmp_path: Path) -> None:
+    recorded(tmp_path, 1.0)
+    rows = (tmp_path / "scans.csv").read_text("utf-8")
+    bearings = [f"{time}.5,C,,{math.atan2(300.0, 8.0 * time - 200.0)}" for time in range(40)]
+    (tmp_path / "scans.csv").write_text(rows + "\n".join([*bearings, ""]), "utf-8")
+    camera = (
+        "  - {name: C, position: [0, 0], measurement: {kind: bearing_only}, noise: {kind: constant, std: [.004]}}\n"
+    )
+    (tmp_path / "both.yaml").write_text(SENSORS % "" + camera, "utf-8")
+    both = scenario_from_recording(tmp_path / "both.yaml", tmp_path / "scans.csv")
+    record = run_scenario(both.scenario, "stationary", seed=0)
+    assert np.mean([len(each.labels) for each in record.estimates[10:]]) == pytest.approx(3.0, abs=0.3)
+    (tmp_path / "camera.yaml").write_text((SENSORS % "").replace("  - {name: R", camera + "  # {name: R"), "utf-8")
+    (tmp_path / "bearings.csv").write_text("\n".join(["time,sensor,range_m,bearing_rad", *bearings, ""]), "utf-8")
+    with pytest.raises(ScenarioError, match=r"give one wide site in birth\.sites"):
+        scenario_from_recording(tmp_path / "camera.yaml", tmp_path / "bearings.csv")

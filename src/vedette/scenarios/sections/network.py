@@ -71,7 +71,8 @@ def births_from_measurements(model: ScenarioModel) -> Iterator[Finding]:
     if model.filter.kind in UNLABELLED:
         yield path, f"none, as {model.filter.kind} filters have no labels", "births from measurements"
     without = [i for i, sensor in enumerate(model.sensors) if sensor.measurement.kind not in (*PLACED, "custom")]
-    if isinstance(fusion, Fusion) or len(without) == len(model.sensors):  # each of the sensors that are fused by it
+    is_central = isinstance(fusion, Fusion) and fusion.kind in SCAN_FUSIONS
+    if not is_central or len(without) == len(model.sensors):  # else some sensors start tracks for all
         for i in without:
             wanted = "a measurement that says where a target is, for birth.from_measurements"
             yield ("sensors", i, "measurement", "kind"), wanted, describe(model.sensors[i].measurement.kind)
