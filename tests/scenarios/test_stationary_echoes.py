@@ -84,3 +84,17 @@ def test_the_fit_names_them_and_a_setting_leaves_them_out(tmp_path: Path) -> Non
         assert any("are left out" in line for line in scenario_warnings(scenario)) is bool(more)
     assert numbers[0] > 2.0
     assert numbers[1] == pytest.approx(1.0, abs=0.1)
+
+
+def test_a_lane_of_traffic_in_a_long_recording_is_no_place() -> None:
+    """Ships that turn at the same places again and again: all over the recording, but not all through it."""
+    rng, scans = np.random.default_rng(3), []
+    for k in range(3000):
+        swing = 1200.0 * np.sin(k / 120.0 + np.arange(4.0))
+        places = np.column_stack([swing, 800.0 * np.arange(4.0) - 1200.0])[rng.random(4) < 0.9]
+        seen = np.concatenate([places, rng.uniform(-3000.0, 3000.0, (rng.poisson(2.0), 2))])
+        scans.append((seen + rng.normal(0.0, 15.0, seen.shape),))
+    times = np.arange(3000, dtype=np.float64)
+    recording = RecordedScans(times, 0.0, False, tuple(scans), np.zeros((3000, 1, 3)), (), (None,))
+    site, model = RecordedSensor("C", "position", (0.0, 0.0, 0.0)), ReturnsModel(0.0, (15.0, 15.0), 0.9)
+    assert len(stationary_places(recording, 0, site, model)[0]) == 0

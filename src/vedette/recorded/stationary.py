@@ -15,9 +15,9 @@ from vedette.recorded.returns import ReturnsModel, groups, placed_scans
 from vedette.recorded.scan_times import RecordedScans, RecordedSensor
 
 _REACH = 3.0  # standard deviations of a measurement of a place around it
-_PARTS = 10  # of the recording; a stationary place is measured in nearly all
-_SCANS_A_PART = 8  # at least; a shorter recording shows nothing
-_PRESENT = 0.8  # share of the parts, with the first and the last
+_PARTS = 10  # of a recording, or more; a stationary place is measured in nearly all
+_SCANS_A_PART = (8, 20)  # at least, as a shorter recording shows nothing; at most, as lanes of traffic come and go
+_PRESENT = 0.8  # share of the parts, with the first two and the last two
 _DENSER = 3.0  # times as many measurements in each half as in the ring up to three times as far, for the same area
 _SURE = 6.0  # standard deviations of this number above it
 _MOST = 5000  # measurements that are searched
@@ -33,21 +33,22 @@ def stationary_places(
     """
     scans = placed_scans(recording, s, site, model)
     none = np.empty((0, 2)), [np.zeros(len(scan.places), np.bool_) for scan in scans]
-    if model.stds is None or len(scans) < _PARTS * _SCANS_A_PART:
+    if model.stds is None or len(scans) < _PARTS * _SCANS_A_PART[0]:
         return none
     places = np.concatenate([scan.places for scan in scans])
     reach = _REACH * np.concatenate([scan.stds for scan in scans])
-    part = np.repeat(np.arange(len(scans)) * _PARTS // len(scans), [len(scan.places) for scan in scans])
+    num = max(_PARTS, len(scans) // _SCANS_A_PART[1])
+    part = np.repeat(np.arange(len(scans)) * num // len(scans), [len(scan.places) for scan in scans])
     tree, found = cKDTree(places), list[int]()
     mean = math.pi * len(places) / max(float(np.prod(np.ptp(places, axis=0))), 1e-300)
     for i in np.unique(np.linspace(0, len(places) - 1, min(len(places), _MOST)).astype(np.int64)).tolist():
         near = tree.query_ball_point(places[i], reach[i])
         parts = np.unique(part[near])
-        if len(parts) < _PRESENT * _PARTS or parts[0] > 0 or parts[-1] < _PARTS - 1:
+        if len(parts) < _PRESENT * num or parts[0] > 1 or parts[-1] < num - 2:
             continue
         ring = tree.query_ball_point(places[i], _REACH * reach[i], return_length=True) - len(near)
         expected = max(ring / (_REACH**2 - 1.0), mean * reach[i] ** 2)  # the ring may be cut at an edge
-        in_half = int(np.bincount(2 * part[near] // _PARTS, minlength=2).min())
+        in_half = int(np.bincount(2 * part[near] // num, minlength=2).min())
         if in_half > _DENSER * 0.5 * expected + _SURE * math.sqrt(0.5 * expected):
             found.append(i)
     if not found:
