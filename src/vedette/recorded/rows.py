@@ -202,21 +202,25 @@ class Rows(ScanColumns):
         site = self.sites[s]
         place: tuple[float, ...] = site.pose[:2]
         is_blank = all(self._is_blank(i, name) for name in _OWN_POSE if name in self._columns)
-        if is_blank and (site.kind == "position" or self._label(i) not in self._moving):
-            return tuple(site.pose)  # positions do not depend on it, and files of several sensors leave it empty
-        if {"own_lon", "own_lat"} <= set(self._columns):
+        # Positions do not depend on it, and files of several sensors leave it empty.
+        at_site = is_blank and (site.kind == "position" or self._label(i) not in self._moving)
+        if {"own_lon", "own_lat"} <= set(self._columns) and not at_site:
             place = self._agreed(i, self._plane(i, "own_lon", "own_lat"), "own_x", "own_y")
-        elif {"own_x", "own_y"} <= set(self._columns):
+        elif {"own_x", "own_y"} <= set(self._columns) and not at_site:
             place = self._value(i, "own_x"), self._value(i, "own_y")
-        has_heading = "own_heading" in self._columns
+        has_heading = "own_heading" in self._columns and not at_site
         heading = self._angle(i, "own_heading", s, place) if has_heading else site.pose[2]
         pose = [*place, heading, *site.pose[3:]]
-        if is_doppler(site.kind) and {*OWN_SPEEDS} <= set(self._columns):
+        if is_doppler(site.kind) and self._has(i, OWN_SPEEDS, at_site):
             pose[OWN_VELOCITY : OWN_VELOCITY + 2] = (self._value(i, quantity) for quantity in OWN_SPEEDS)
-        if site.kind in HEIGHT_DEPENDENT and "own_height" in self._columns:
+        if site.kind in HEIGHT_DEPENDENT and self._has(i, ("own_height",), at_site):
             pose += [0.0] * (OWN_HEIGHT + 1 - len(pose))
             pose[OWN_HEIGHT] = self._value(i, "own_height")
         return tuple(pose)
+
+    def _has(self, i: int, names: Sequence[str], at_site: bool) -> bool:
+        """Return True if a row has these columns; cells may be empty only where the sensor is at its site."""
+        return {*names} <= set(self._columns) and not (at_site and any(self._is_blank(i, name) for name in names))
 
     def _agreed(self, i: int, place: tuple[float, ...], x: str, y: str) -> tuple[float, ...]:
         """Return a place given in degrees; raises if the row has one in metres, too, that does not agree."""
