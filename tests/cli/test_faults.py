@@ -20,8 +20,8 @@ import pytest
 
 from live.examples import write_live
 from recordings import write_recording
+from short_runs import short_paper_e
 from vedette.campaigns import open_results
-from vedette.scenarios import list_builtin
 from vedette.simulation.storage import UNFINISHED, load_run
 from waiting import PATIENCE, heed_interrupts, wait_until
 
@@ -47,15 +47,7 @@ def rounds(request: pytest.FixtureRequest) -> int:
 
 @pytest.fixture
 def place(tmp_path: Path) -> Iterator[Path]:
-    text = list_builtin()["paper-e"].read_text(encoding="utf-8")
-    for old, new in (
-        ("num_steps: 40", "num_steps: 10"),
-        ("decision_steps: [10, 20, 30]", "decision_steps: [8]"),
-        ("num_samples: 40", "num_samples: 2"),
-        ("first_scan: 11, last_scan: 40", "first_scan: 9, last_scan: 10"),
-    ):
-        text = text.replace(old, new)
-    (tmp_path / "short.yaml").write_text(text, encoding="utf-8")
+    (tmp_path / "short.yaml").write_text(short_paper_e(), encoding="utf-8")
     (tmp_path / "spec.toml").write_text(SPEC)
     write_recording(tmp_path, seconds=60.0)
     started.clear()

@@ -7,26 +7,18 @@ import shutil
 import pytest
 from typer.testing import CliRunner
 
+from short_runs import short_paper_e
 from vedette.campaigns import open_results
 from vedette.cli import app, running
 from vedette.errors import NumericalError
 from vedette.filters import DeltaGlmbFilter
-from vedette.scenarios import list_builtin
 from vedette.simulation.storage import load_run, read_manifest
 
 
 @pytest.fixture
 def scenario_file(tmp_path):
-    text = list_builtin()["paper-e"].read_text(encoding="utf-8")
-    for old, new in (
-        ("num_steps: 40", "num_steps: 10"),
-        ("decision_steps: [10, 20, 30]", "decision_steps: [8]"),
-        ("num_samples: 40", "num_samples: 2"),
-        ("first_scan: 11, last_scan: 40", "first_scan: 9, last_scan: 10"),
-    ):
-        text = text.replace(old, new)
     path = tmp_path / "short.yaml"
-    path.write_text(text, encoding="utf-8")
+    path.write_text(short_paper_e(), encoding="utf-8")
     return path
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import replace
 
@@ -29,26 +30,26 @@ def merged(
     for s, (site, extent) in enumerate(zip(sites, extents, strict=True)):
         if extent is None:
             continue
-        num, dim, squares = 0, len(COMPONENTS[site.kind]), list[float]()
+        before, after, squares = 0, 0, 0.0
         for k, instant in enumerate(scans):
             if (scan := instant[s]) is None:
                 continue
             places = places_of(scan, recording.poses[k, s], site.kind)
             clusters = groups(places, extent.distance)
             instant[s] = means = _means(scan, site.kind, clusters)
-            squares += ((places - places_of(means, recording.poses[k, s], site.kind)[clusters]) ** 2).ravel().tolist()
-            num += len(means)
+            offsets = places - places_of(means, recording.poses[k, s], site.kind)[clusters]
+            before, after, squares = before + len(scan), after + len(means), squares + float((offsets**2).sum())
             if accuracy and (columns := accuracy[k][s]) is not None:
                 accuracy[k][s] = _mean_accuracy(columns, recording.accuracy_columns[s], clusters)
-        if 2 * num == len(squares):
+        if after == before:
             continue
-        spread = float(np.sqrt(np.mean(squares)))
+        spread, dim = math.sqrt(squares / (2 * before)), len(COMPONENTS[site.kind])
         for instant in scans:
             if (scan := instant[s]) is not None:
                 instant[s] = with_added_noise(scan, _spread_covs(scan, site.kind, dim, spread))
         texts.append(
             f"{site.name}: returns of a scan within {extent.distance:.3g} m of each other are taken for one target "
-            f"({extent.evidence}): {len(squares) // 2} measurements became {num}, their noise grew by {spread:.2g} m "
+            f"({extent.evidence}): {before} measurements became {after}, their noise grew by {spread:.2g} m "
             "(`extent: 0` for the sensor keeps them apart)"
         )
     notes = (*recording.notes, *texts)

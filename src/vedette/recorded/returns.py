@@ -72,7 +72,10 @@ def extents_of(
 
     Returns must be twice as dense there as around it, or the groups are those of clutter.
     """
-    scans = [placed_scans(recording, s, site, model) for s, (site, model) in enumerate(zip(sites, models, strict=True))]
+    scans: list[list[PlacedScan]] = []
+    if any(model.extent is None for model in models):
+        both = enumerate(zip(sites, models, strict=True))
+        scans = [placed_scans(recording, s, site, model) for s, (site, model) in both]
     found: list[Extent | None] = []
     for s, model in enumerate(models):
         if model.extent is not None:
