@@ -238,6 +238,24 @@ def test_check_accepts_sensors_files(tmp_path: Path) -> None:
     ]
 
 
+@pytest.mark.parametrize(
+    ("targets", "faults"),
+    [
+        ("{columns: {time: utc}}", []),
+        ("{columns: {tme: utc}}", ["targets.columns.tme: expected one of "]),
+        ("3", ["targets: expected a mapping, got 3"]),
+    ],
+)
+def test_check_knows_sensors_files_with_columns_of_targets(tmp_path: Path, targets: str, faults: list[str]) -> None:
+    file = tmp_path / "radars.yaml"
+    file.write_text(f"{SENSORS}\ntargets: {targets}\n", encoding="utf-8")
+    result = vedette("check", str(file))
+    assert result.exit_code == (1 if faults else 0)
+    lines = result.stdout.splitlines() if faults else []
+    assert len(lines) == len(faults)
+    assert all(fault in line for fault, line in zip(faults, lines, strict=True))
+
+
 def test_check_without_files_is_wrong_use() -> None:
     assert vedette("check").exit_code == 2
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from pathlib import Path as FilePath
 from typing import Any, NamedTuple
@@ -14,8 +14,10 @@ from vedette.internal.text import pluralise
 from vedette.scenarios.diagnostics import Diagnostic, Fault, describe
 from vedette.scenarios.loading import diagnose, locate_fault
 from vedette.scenarios.sections import ScenarioModel
+from vedette.scenarios.sections.base import Section
 from vedette.scenarios.sections.courses import headings_beside_north
 from vedette.scenarios.sections.recording import RecordingSection
+from vedette.scenarios.sections.targets import RecordedTargets
 from vedette.scenarios.sections.world import STATE_DIMS
 from vedette.scenarios.validation import read_section
 from vedette.scenarios.wording import name_in_words
@@ -30,6 +32,11 @@ EXPECTED_BIRTHS = 0.5  # expected births from measurements in the region between
 _EXISTENCE = 0.03  # largest existence probability of a birth from a measurement
 HEIGHT_STD, _CLIMB_STD = 4000.0, 10.0  # m and m/s, standard deviations of a birth
 MAX_STEPS = 1_000_000  # steps, the maximum of a scenario
+# Sections about files, which commands name, and what they add to the section.
+_SECTIONS_OF_FILES: dict[str, tuple[type[Section], dict[str, str]]] = {
+    "recording": (RecordingSection, {"path": "scans.csv"}),
+    "targets": (RecordedTargets, {"kind": "recorded", "path": "truth.csv"}),
+}
 _MAX_NAMED = 5  # sensors that a summary names
 _ASSUMED = ("region", "motion", "survival", "birth")  # each is assumed from the scans unless it is given
 
@@ -53,11 +60,14 @@ class SensorsFile(NamedTuple):
 
 
 def is_sensors_file(path: FilePath) -> bool:
-    """Return True if the file is YAML with `sensors`, but has neither `time` nor `targets`."""
+    """Return True if the file is YAML with `sensors`, but has neither `time` nor a `kind` of `targets`."""
     if not path.is_file() or path.suffix.lower() == ".toml":
         return False
     data = read_yaml(read_text(path, "sensors file", MAX_BYTES), str(path)).data
-    return isinstance(data, Mapping) and "sensors" in data and not data.keys() & {"time", "targets"}
+    if not isinstance(data, Mapping) or "sensors" not in data or "time" in data:
+        return False
+    targets = data.get("targets")
+    return not isinstance(targets, Mapping) or "kind" not in targets
 
 
 def check_sensors_file(path: FilePath) -> SensorsFile:
@@ -68,20 +78,25 @@ def check_sensors_file(path: FilePath) -> SensorsFile:
         ScenarioError: with every fault of the file.
     """
     document = read_sensors_file(path)
-    given = {key: value for key, value in document.data.items() if key != "recording"}
+    given = {key: value for key, value in document.data.items() if key not in _SECTIONS_OF_FILES}
     data = {**placeholder_sections(given, 10.0), "name": path.stem, **given}
     data |= {"time": {"num_steps": MAX_STEPS}, "targets": {"kind": "scripted", "tracks": []}}
     model, faults = diagnose(replace(document, data=data), path.parent)
-    if "recording" in document.data:
-        recording = document.data["recording"]
-        _, diagnostics = read_section(
-            RecordingSection, {"path": "scans.csv", **recording} if isinstance(recording, Mapping) else {}
-        )
-        faults += [locate_fault(document, each._replace(path=("recording", *each.path))) for each in diagnostics]
-    if model is None or faults:
-        faults.sort(key=lambda fault: fault.place)
-        raise ScenarioError([_message_for_sensors_file(fault, document, data, path) for fault in faults])
+    texts = [(fault.place, _message_for_sensors_file(fault, document, data, path)) for fault in faults]
+    texts += [(fault.place, fault.message(str(path))) for fault in _faults_of_files(document)]
+    if model is None or texts:
+        raise ScenarioError([text for _, text in sorted(texts)])
     return SensorsFile(model.sensor_names, _quantities(model), _not_given(document.data))
+
+
+def _faults_of_files(document: Document) -> Iterator[Fault]:
+    """Yield the faults of the sections about files, which commands name."""
+    for name, (section, rest) in _SECTIONS_OF_FILES.items():
+        given = document.data.get(name, {})
+        diagnostics = [Diagnostic((), "a mapping", describe(given))]
+        if isinstance(given, Mapping):
+            _, diagnostics = read_section(section, {**rest, **given})
+        yield from (locate_fault(document, each._replace(path=(name, *each.path))) for each in diagnostics)
 
 
 def placeholder_sections(given: Mapping[str, Any], speed: float) -> dict[str, Any]:
