@@ -5,6 +5,7 @@ from __future__ import annotations
 import gc
 import json
 import re
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +15,7 @@ import pytest
 from live.examples import SYNCHRONOUS, answered, line, small, walk, write_live
 from vedette.errors import InputError
 from vedette.live import MAX_LINE_BYTES, LiveLoop, build_live_loop
+from vedette.live.building import warm_up
 from vedette.recorded import Conventions, Origin, RecordedSensor, parse_scans
 from vedette.recorded.files import read_table
 from vedette.scenarios.build import build_experiment
@@ -75,6 +77,25 @@ def test_biases_are_removed_from_the_measurements_of_lines(tmp_path: Path) -> No
     found = [json.loads(answer) for answer in answered(small(tmp_path / "biased", biased), told)]
     assert found == wanted
     assert found[-1]["tracks"]
+
+
+def test_returns_within_the_extent_of_a_sensor_are_one_measurement(tmp_path: Path) -> None:
+    rng = np.random.default_rng(0)
+    ships = np.array([[-200.0, 100.0], [300.0, -150.0]])
+    offsets = rng.uniform(-15.0, 15.0, (20, 2, 4, 2))
+    scans = [(ships[:, None] + [5.0 * k, 0.0] + offsets[k]).reshape(-1, 2) for k in range(20)]
+    lines = [line(1, float(k), scan.tolist()) for k, scan in enumerate(scans)]
+    text = SYNCHRONOUS.replace("{position: [0.0, 0.0]}", "{position: [0.0, 0.0], extent: 40.0}")
+    live = small(tmp_path, text)
+    state, apart = live.initial(), small(tmp_path).initial()
+    for each in lines:
+        state, (answer,) = live.process(state, each)
+        apart, (answer_apart,) = small(tmp_path).process(apart, each)
+    assert len(answer["tracks"]) == 2 < len(answer_apart["tracks"])
+    from_means = offsets - offsets.mean(axis=2, keepdims=True)
+    assert state.spreads[0] == (160, pytest.approx((from_means**2).sum()))
+    assert state.spreads[1] == (0, 0.0)
+    np.testing.assert_allclose([t["std"][0] for t in answer["tracks"]], 6.0, atol=3.0)
 
 
 BAD: list[tuple[bytes, str]] = [
@@ -311,3 +332,21 @@ def test_a_measurement_beyond_the_reach_of_its_sensor_is_counted_and_left_out(tm
     answers = [json.loads(answer) for answer in answered(small(tmp_path, near), lines)]
     assert [answer.get("beyond", 0) for answer in answers] == [2, 1, 0]
     assert all("error" not in answer for answer in answers)
+
+
+def test_the_warm_up_decides_once_and_changes_no_answer(tmp_path: Path) -> None:
+    class Failing:
+        """A planner that counts its decisions and then fails."""
+
+        num = 0
+
+        def plan(self, *_: Any, **__: Any) -> Any:
+            self.num += 1
+            raise RuntimeError("no plan")
+
+    live, lines = small(tmp_path), walk(6)
+    expected = answered(live, lines)
+    planner = Failing()
+    warm_up(replace(live, planner=planner))  # type: ignore[arg-type]
+    assert planner.num == 1
+    assert answered(live, lines) == expected

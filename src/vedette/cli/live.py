@@ -131,7 +131,7 @@ def live(
         screen = _open_screen(live_scenario, loop, lambda: persistent.state)
         loop = screen.live
     with interruptible("what came is kept where --snapshot or --record say so"):
-        compile_if_cold(live_scenario.scenario)
+        _compile(live_scenario, loop)
         persistent = PersistentLoop(
             loop, identity=identity, snapshot=snapshot, snapshot_interval=snapshot_interval, record=record, report=note
         )
@@ -175,6 +175,17 @@ def _build_loop(live_scenario: LiveScenario, options: _LoopOptions) -> LiveLoop:
         decide_every=options.decide_every,
         seed=options.seed,
     )
+
+
+def _compile(live_scenario: LiveScenario, loop: LiveLoop) -> None:
+    """Compile what the loop calls, as clients would wait for it."""
+    from vedette.live.building import warm_up
+    from vedette.scenarios.trust import custom_code
+
+    compile_if_cold(live_scenario.scenario)
+    if not custom_code(live_scenario.scenario.model):
+        with compiling():
+            warm_up(loop)
 
 
 def _open_screen(live_scenario: LiveScenario, loop: LiveLoop, state: Callable[[], LiveState]) -> LiveScreen:

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from typing import Any
+
+import numpy as np
 
 from vedette.control import ConstraintReportingPlanner, RequiresTruth
 from vedette.errors import InputError
@@ -13,8 +16,8 @@ from vedette.recorded.extents import box_of
 from vedette.scenarios.build import build_experiment, build_planner
 from vedette.scenarios.from_recording import LiveScenario
 from vedette.scenarios.sections.planners import NamedPlanner
-from vedette.scenarios.sections.recording import recorded_sensors
-from vedette.tracking import OutOfSequenceTracker
+from vedette.scenarios.sections.recording import recorded_sensors, returns_models
+from vedette.tracking import OutOfSequenceTracker, SensorScan
 
 
 def build_live_loop(
@@ -72,4 +75,22 @@ def build_live_loop(
         seed=seed,
         classes=tuple(model.classes),
         valid_area=box_of(model.region.build().corners),
+        extents=tuple(returns.extent or 0.0 for returns in returns_models(model)),
     )
+
+
+def warm_up(live: LiveLoop) -> None:
+    """Compile what a loop calls by scans of a made-up target, one of them late, before the first line arrives.
+
+    Their state is discarded, and no answer depends on it. What fails with them is compiled at its first use. Not for
+    custom code, which may have a state of its own.
+    """
+    tracker, timeline = live.tracker.tracker, live.tracker.initial()
+    with suppress(Exception):
+        for time in (1.0, 2.0, 1.5):
+            ones = (np.ones((1, sensor.meas_dim)) for sensor in tracker.sensors)
+            scans = [SensorScan(s, time, rows, timeline.poses[s]) for s, rows in enumerate(ones)]
+            timeline, _ = live.tracker.process(timeline, scans)
+        live.estimate(timeline.state.fused, timeline.state.step)
+        if live.planner is not None:
+            live.planner.plan(timeline.state, timeline.poses, rng=np.random.default_rng(0))

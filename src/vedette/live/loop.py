@@ -22,6 +22,7 @@ from vedette.models.row_noise import measured_part
 from vedette.platforms.compass import Compass, PlaneCompass, courses_of
 from vedette.recorded import Conventions, Origin, RecordedSensor
 from vedette.recorded.extents import beyond_reach, is_within, places_of
+from vedette.recorded.merging import Spread, merged_scan
 from vedette.simulation.journal import error_cause
 from vedette.simulation.loop import PLANNER
 from vedette.tracking import OutOfSequenceTracker, SensorScan, Timeline
@@ -47,6 +48,7 @@ class LiveState:
         claimants: sensors of the consecutive scans that agreed on it.
         due: time of the next decision in s; inf: none.
         num_decisions: number of decisions so far.
+        spreads: fields of `vedette.recorded.merging.Spread` for the returns of each sensor.
     """
 
     timeline: Timeline
@@ -59,6 +61,7 @@ class LiveState:
     claimants: tuple[int, ...] = ()
     due: float = math.inf
     num_decisions: int = 0
+    spreads: tuple[tuple[float, ...], ...] = ()
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -83,6 +86,8 @@ class LiveLoop:
         classes: names of the classes of targets; () if they have none.
         valid_area: (2, 2) lower left and upper right corner of the area of valid measurements, in m; others are left
             out and counted in the answer as `beyond`. None: no limit.
+        extents: for each sensor, the largest distance in m between neighbouring returns of a target; 0: returns are
+            not merged.
     """
 
     tracker: OutOfSequenceTracker
@@ -98,6 +103,7 @@ class LiveLoop:
     seed: int = 0
     classes: tuple[str, ...] = ()
     valid_area: Floats | None = None
+    extents: tuple[float, ...] = ()
 
     @property
     def compass(self) -> Compass | None:
@@ -108,7 +114,8 @@ class LiveLoop:
 
     def initial(self) -> LiveState:
         """Return the state before the first line."""
-        return LiveState(self.tracker.initial(), latest=(-math.inf,) * len(self.sites))
+        num = len(self.sites)
+        return LiveState(self.tracker.initial(), latest=(-math.inf,) * num, spreads=((0, 0.0),) * num)
 
     def process(self, state: LiveState, line: bytes) -> tuple[LiveState, tuple[Answer, ...]]:
         """Process a line; answer with the estimates and, if one was due, a plan, or with the error in the line.
@@ -127,6 +134,7 @@ class LiveLoop:
                 fault = str(reject(f"{place}, time", expected, f"{time - (state.timeline.newest or 0.0):g} s after it"))
                 return _error_answer(checked, fault)
             scan, num_beyond = self._drop_invalid(message.scan)
+            checked, scan = self._merge_returns(checked, scan)
             timeline, _ = self.tracker.process(state.timeline, [replace(scan, time=time)])
             latest = list(state.latest)
             latest[message.scan.sensor] = max(latest[message.scan.sensor], time)
@@ -149,6 +157,17 @@ class LiveLoop:
         places = places_of(measured_part(rows, len(COMPONENTS[site.kind])), pose, site.kind)
         inside = is_within(places, self.valid_area) & ~beyond_reach(places, pose[:2], site.reach)
         return replace(scan, measurements=rows[inside]), int(np.count_nonzero(~inside))
+
+    def _merge_returns(self, state: LiveState, scan: SensorScan) -> tuple[LiveState, SensorScan]:
+        """Return the scan with one measurement a target; its noise grows by the spread of all returns so far."""
+        s, rows = scan.sensor, np.asarray(scan.measurements, np.float64)
+        if not self.extents or self.extents[s] <= 0.0 or not len(rows):
+            return state, scan
+        kind = self.sites[s].kind
+        means, _, spread = merged_scan(rows, np.asarray(scan.pose), kind, self.extents[s])
+        spread += Spread(int(state.spreads[s][0]), state.spreads[s][1])
+        state = replace(state, spreads=(*state.spreads[:s], tuple(spread), *state.spreads[s + 1 :]))
+        return state, replace(scan, measurements=spread.added_to(means, kind) if spread.squares else means)
 
     def _on_clock(self, state: LiveState, message: Message, place: str) -> tuple[LiveState, float]:
         """Return the state with the form and offset of times set, and the scan's time on the clock of the tracker.

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -14,6 +15,25 @@ from vedette.models.row_noise import with_added_noise
 from vedette.recorded.extents import places_of
 from vedette.recorded.returns import Extent, groups
 from vedette.recorded.scan_times import RecordedScans, RecordedSensor, with_wrapped_angles
+
+
+class Spread(NamedTuple):
+    """Number of returns, and the sum of their squared distances from the mean of their target, m^2."""
+
+    num: int = 0
+    squares: float = 0.0
+
+    def __add__(self, other: Any) -> Spread:
+        return Spread(self.num + other.num, self.squares + other.squares)
+
+    @property
+    def std(self) -> float:
+        """Standard deviation of a return on each axis, m; 0 without returns."""
+        return math.sqrt(self.squares / (2 * max(self.num, 1)))
+
+    def added_to(self, scan: Floats, kind: str) -> Floats:
+        """Return the scan with noise that has grown by that of a single return."""
+        return with_added_noise(scan, _spread_covs(scan, kind, len(COMPONENTS[kind]), self.std))
 
 
 def merged(
@@ -30,30 +50,35 @@ def merged(
     for s, (site, extent) in enumerate(zip(sites, extents, strict=True)):
         if extent is None:
             continue
-        before, after, squares = 0, 0, 0.0
+        spread, after = Spread(), 0
         for k, instant in enumerate(scans):
             if (scan := instant[s]) is None:
                 continue
-            places = places_of(scan, recording.poses[k, s], site.kind)
-            clusters = groups(places, extent.distance)
-            instant[s] = means = _means(scan, site.kind, clusters)
-            offsets = places - places_of(means, recording.poses[k, s], site.kind)[clusters]
-            before, after, squares = before + len(scan), after + len(means), squares + float((offsets**2).sum())
+            means, clusters, own_spread = merged_scan(scan, recording.poses[k, s], site.kind, extent.distance)
+            instant[s], spread, after = means, spread + own_spread, after + len(means)
             if accuracy and (columns := accuracy[k][s]) is not None:
                 accuracy[k][s] = _mean_accuracy(columns, recording.accuracy_columns[s], clusters)
-        if after == before:
+        if after == spread.num:
             continue
-        spread, dim = math.sqrt(squares / (2 * before)), len(COMPONENTS[site.kind])
         for instant in scans:
             if (scan := instant[s]) is not None:
-                instant[s] = with_added_noise(scan, _spread_covs(scan, site.kind, dim, spread))
+                instant[s] = spread.added_to(scan, site.kind)
         texts.append(
             f"{site.name}: returns of a scan within {extent.distance:.3g} m of each other are taken for one target "
-            f"({extent.evidence}): {before} measurements became {after}, their noise grew by {spread:.2g} m "
+            f"({extent.evidence}): {spread.num} measurements became {after}, their noise grew by {spread.std:.2g} m "
             "(`extent: 0` for the sensor keeps them apart)"
         )
     notes = (*recording.notes, *texts)
     return replace(recording, scans=tuple(map(tuple, scans)), accuracy=tuple(map(tuple, accuracy)), notes=notes)
+
+
+def merged_scan(scan: Floats, pose: Floats, kind: str, distance: float) -> tuple[Floats, Ints, Spread]:
+    """Return the means of the returns of each target in a scan, the target of each return, and their spread."""
+    places = places_of(scan, pose, kind)
+    clusters = groups(places, distance)
+    means = _means(scan, kind, clusters)
+    offsets = places - places_of(means, pose, kind)[clusters]
+    return means, clusters, Spread(len(scan), float((offsets**2).sum()))
 
 
 def _spread_covs(scan: Floats, kind: str, dim: int, spread: float) -> Floats:
