@@ -70,7 +70,6 @@ HEAVY = {
     ("campaign", "spec.toml"): ("pyarrow", "campaigns"),
     ("merge", "there"): ("pyarrow", "campaigns"),
     ("results", "there"): ("pyarrow", "campaigns"),
-    ("upgrade", "there"): ("pyarrow", "campaigns"),
     ("report", "there"): ("jinja2 and matplotlib and pyarrow", "report"),
     ("demo",): ("jinja2 and matplotlib and pyarrow", "report"),
     ("reproduce",): ("jinja2 and matplotlib and pyarrow", "report"),

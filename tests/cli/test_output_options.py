@@ -75,8 +75,6 @@ CALLS: list[tuple[tuple[str, ...], set[str]]] = [
     (("campaign", "spec.toml", "--workers", "1", "--shard", "2/2"), {"folder", "finished", "failed"}),
     (("merge", "trial-shards", "--out", "merged"), {"folder", "runs", "finished", "missing_shards", "commands"}),
     (("results", "trial-results", "--export", "tables", "--tex", "table.tex"), {"comparisons", "missing", "written"}),
-    (("upgrade", "trial-results"), {"folder", "previous_format", "format"}),
-    (("upgrade", "short.yaml"), {"file", "changes"}),
     (("report", "trial-results"), {"page", "figures"}),
     (("demo", "short.yaml", "--planners", "stationary,own", "--workers", "1"), {"comparisons", "page"}),
     (

@@ -9,7 +9,7 @@ from __future__ import annotations
 import io
 import json
 import zipfile
-from collections.abc import Container, Mapping
+from collections.abc import Container
 from typing import Any
 
 from vedette.errors import InputError
@@ -17,7 +17,6 @@ from vedette.internal.reading import error_summary, parse_json, read_members
 from vedette.simulation import serialization
 from vedette.simulation.records import RunRecord, RunSummary
 from vedette.simulation.tables import run_facts
-from vedette.simulation.upgrading import upgraded_facts, upgraded_files
 
 _RUN = "run.json"
 _EPOCH = (1980, 1, 1, 0, 0, 0)  # the earliest time in a zip archive
@@ -52,16 +51,6 @@ def decode_summary(payload: bytes, timings: bytes | None = None) -> RunSummary:
     """Return the summary of a run, in a third of the time of `decode`; raises as `decode`."""
     facts, members = _members(payload, {_RUN, *serialization.SUMMARY_FILES})
     return serialization.decode_summary(facts, members, "run", timings)
-
-
-def upgraded(payload: bytes, number: int, strategies: Mapping[str, str]) -> bytes:
-    """Return the bytes of a run of format `number` in the present format.
-
-    strategies: present names of strategies by former ones. Raises `InputError` as `decode`.
-    """
-    facts, members = _members(payload)
-    files = upgraded_files(members, number, strategies)
-    return encode(serialization.decode_run(upgraded_facts(facts, strategies), files, "run"))
 
 
 def _members(payload: bytes, names: Container[str] | None = None) -> tuple[dict[str, Any], dict[str, bytes]]:

@@ -149,9 +149,9 @@ def lock_of(folder: Path) -> sqlite3.Connection:
     return locked(folder / LOCK, busy, f"{folder}: expected a folder that can be written; {LOCK}:")
 
 
-def check_contents(path: Path, rows: Sequence[tuple[str]], *contents: str) -> None:
-    """Raise `InputError` unless the file contains only the checksum of the manifest, or one of several."""
-    if list(rows) not in [[(each,)] for each in contents]:
+def check_contents(path: Path, rows: Sequence[tuple[str]], contents: str) -> None:
+    """Raise `InputError` unless the file contains only the checksum `contents` of the manifest."""
+    if list(rows) != [(contents,)]:
         raise InputError(
             f"{path}: expected the runs of the manifest beside it; they are another campaign's, or the manifest was "
             "altered"

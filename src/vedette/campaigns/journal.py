@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from vedette.campaigns import database
-from vedette.campaigns.rows import Entry, Row, pack, unpack, verified
+from vedette.campaigns.rows import Row, pack, unpack, verified
 from vedette.errors import InputError
 from vedette.internal.files import sweep
 
@@ -30,11 +30,8 @@ class Writer:
         assert self._opened is not None  # set by `open_runs`
         return self._opened
 
-    def open_runs(self, contents: str, *others: str) -> None:
-        """Create the file, or check that it belongs to the campaign whose manifest has the checksum `contents`.
-
-        others: further checksums that the file may have.
-        """
+    def open_runs(self, contents: str) -> None:
+        """Create the file, or check that it belongs to the campaign whose manifest has the checksum `contents`."""
         with database.translated_errors(self._path):
             opened = sqlite3.connect(self._path, timeout=database.WAIT, isolation_level=None, check_same_thread=False)
             self._opened = opened
@@ -48,7 +45,7 @@ class Writer:
             database.check_tables(self._path, opened)
             rows = opened.execute("SELECT contents FROM campaign").fetchall()
             opened.execute("COMMIT")
-        database.check_contents(self._path, rows, contents, *others)
+        database.check_contents(self._path, rows, contents)
 
     def put(self, rows: Sequence[Row], session: int) -> None:
         """Store runs, all or none; when this returns they survive any failure of this process or machine.
@@ -131,32 +128,6 @@ class Writer:
             place = database.place_of(*row[:2])
             raise InputError(f"{reader}: {place}expected the bytes that another folder has of it; got others")
         return False
-
-    def rewrite(self, payload: Callable[[Entry], bytes], contents: str) -> None:
-        """Replace the payload of every run, and the checksum of the manifest, in one transaction.
-
-        Raises `InputError`, and changes nothing, for a damaged run; also raises as `payload`.
-        """
-        with database.translated_errors(self._path):
-            keys = self._keys()
-            self._database.execute("BEGIN IMMEDIATE")
-            with self._database:
-                for key in keys:
-                    self._rewrite(*key, payload)
-                self._database.execute("UPDATE campaign SET contents = ?", (contents,))
-
-    def _rewrite(self, cell: str, run: int, payload: Callable[[Entry], bytes]) -> None:
-        where = f"{self._path}: {database.place_of(cell, run)}"
-        rows = self._database.execute(f"SELECT {database.COLUMNS} FROM runs WHERE cell = ? AND run = ?", (cell, run))
-        entry = verified(rows.fetchone())
-        if entry is None:
-            raise InputError(f"{where}{database.ALTERED}")
-        try:
-            packed = pack(cell, run, payload(entry))
-        except InputError as error:
-            raise InputError(f"{where}{error}") from error
-        change = "UPDATE runs SET payload = ?, payload_sha256 = ? WHERE cell = ? AND run = ?"
-        self._database.execute(change, (*packed, cell, run))
 
     def discard(self, cell: str, run: int) -> None:
         """Delete a run from the file."""

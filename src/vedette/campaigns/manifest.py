@@ -24,7 +24,7 @@ from vedette.scenarios import Scenario
 from vedette.scenarios.sections import ScenarioModel
 from vedette.scenarios.yaml_reader import read_yaml
 from vedette.simulation.serialization import FORMAT_VERSION
-from vedette.simulation.storage import VersionCheck, check_version, versions
+from vedette.simulation.storage import check_version, versions
 
 MANIFEST = "manifest.json"
 FORMAT = "vedette-campaign"
@@ -105,8 +105,8 @@ def new_session() -> dict[str, Any]:
     return {"started": _now(), "versions": versions("llvmlite"), "machine": machine}
 
 
-def read_manifest(folder: Path, check: VersionCheck = check_version) -> dict[str, Any]:
-    """Return the manifest of a results folder, of a format that passes `check`.
+def read_manifest(folder: Path) -> dict[str, Any]:
+    """Return the manifest of a results folder.
 
     Raises `InputError`, naming the file, if there is no valid one.
     """
@@ -122,7 +122,7 @@ def read_manifest(folder: Path, check: VersionCheck = check_version) -> dict[str
     if not isinstance(manifest, dict) or manifest.get("format") != FORMAT:
         raise InputError(f"{path}: expected the manifest of a results folder; got another file")
     sessions = manifest.get("sessions")
-    check(manifest, sessions[-1] if isinstance(sessions, list) and sessions else None, path)
+    check_version(manifest, sessions[-1] if isinstance(sessions, list) and sessions else None, path)
     missing = [field for field in (*_FIXED, "num_runs", "sessions") if field not in manifest]
     if missing:
         raise InputError(f"{path}: expected a field {missing[0]}; it is cut short or altered")

@@ -21,7 +21,7 @@ from vedette.scenarios.sections.planners import STRATEGIES
 from vedette.scenarios.validation import read_section
 
 BUILTIN_FOLDER = Path(__file__).parent / "builtin"
-MOST_BYTES = 2_000_000
+_MOST_BYTES = 2_000_000
 # A cell is a scenario with its filters built; building this many takes minutes.
 _MOST_CELLS, _MOST_VALUES = 10_000, 1000
 
@@ -135,19 +135,15 @@ def parse_spec(text: str, file: str = "<text>") -> CampaignSpec:
     Raises:
         InputError: the text is not TOML, or fields are invalid; the message lists them, one per line.
     """
-    return spec_from_data(parse_toml(text, file), file)
-
-
-def parse_toml(text: str, file: str) -> dict[str, Any]:
-    """Return the plain data of a campaign file. Raises `InputError` for text that is not TOML."""
     try:
-        return tomllib.loads(text)
+        data = tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
         raise InputError(f"{file}: expected TOML; {elided(printable(str(error)), 300)}") from None
     except RecursionError:
         raise InputError(f"{file}: expected TOML; got brackets inside brackets hundreds of times over") from None
     except ValueError:  # an invalid date, or a number with thousands of digits
         raise InputError(f"{file}: expected TOML; got a date or number that cannot be") from None
+    return spec_from_data(data, file)
 
 
 def spec_from_data(data: Any, place: str = "campaign") -> CampaignSpec:
@@ -174,4 +170,4 @@ def load_spec(name_or_path: Path | str) -> CampaignSpec:
     path = builtin.get(str(name_or_path), Path(name_or_path))
     if not os.path.exists(path):  # also False for an invalid path
         raise InputError(f"{path}: no such file; expected a campaign file or one of {', '.join(builtin)}")
-    return parse_spec(read_text(path, "campaign file", MOST_BYTES), str(path))
+    return parse_spec(read_text(path, "campaign file", _MOST_BYTES), str(path))

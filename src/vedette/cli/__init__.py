@@ -19,7 +19,7 @@ from vedette.cli.merging import merge
 from vedette.cli.output import with_output_options
 from vedette.cli.reporting import report, video
 from vedette.cli.reproducing import reproduce
-from vedette.cli.results import results, upgrade
+from vedette.cli.results import results
 from vedette.cli.running import run
 from vedette.cli.scenario_files import crowd, generate, init, list_, schema
 from vedette.cli.show import show
@@ -77,7 +77,6 @@ _COMMANDS: dict[str, list[tuple[Callable[..., None], str]]] = {
         (report, "Write an HTML report"),
         (video, "Write a video of a run"),
         (merge, "Merge results of shards"),
-        (upgrade, "Convert results to the current format"),
         (benchmark, "Compare your planner or tracker with built-in ones"),
     ],
 }

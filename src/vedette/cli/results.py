@@ -1,4 +1,4 @@
-"""The commands that print, export and upgrade saved results, of a campaign or a single run: results, upgrade."""
+"""The command that prints and exports saved results, of a campaign or a single run: results."""
 
 from __future__ import annotations
 
@@ -15,7 +15,6 @@ from vedette.cli.errors import check_ending, usage_error
 from vedette.cli.options import ResultsFolder
 from vedette.cli.output import echo, emit_json, note
 from vedette.cli.run_summary import print_run
-from vedette.cli.running import interruptible
 from vedette.errors import VedetteError
 from vedette.internal.extras import require_packages
 from vedette.internal.text import pluralise
@@ -162,53 +161,3 @@ def print_progress(opened: CampaignResults) -> None:
     if failures:
         echo(f"failed: {pluralise(len(failures), 'run')}; the same command tries again:")
         print_failures(failures)
-
-
-def upgrade(
-    path: Annotated[
-        Path,
-        typer.Argument(
-            metavar="PATH",
-            help="Results folder of a campaign or of a single run, scenario or sensors file (YAML), or campaign file "
-            "(TOML).",
-        ),
-    ],
-) -> None:
-    """Bring results, a scenario or sensors file, or a campaign file of an earlier version up to date, in place.
-
-    In files, former keys and values get their present names; comments and layout stay.
-    """
-    if path.is_file():
-        _upgrade_file(path)
-    else:
-        _upgrade_folder(path)
-
-
-def _upgrade_file(path: Path) -> None:
-    if path.with_name("manifest.json").exists():
-        raise usage_error(f"expected the folder of these results, {path.parent}; got a file in it", "PATH")
-    if path.suffix.lower() == ".toml":
-        from vedette.campaigns.renamed import upgrade_campaign_file as upgrade_file
-    else:
-        from vedette.scenarios.upgrading import upgrade_scenario_file as upgrade_file
-    lines = upgrade_file(path)
-    for line in lines:
-        echo(str(line))
-    echo(f"{path}: {pluralise(len(lines), 'change')}" if lines else f"{path}: up to date; nothing was changed")
-    emit_json({"file": path, "changes": [line._asdict() for line in lines]})
-
-
-def _upgrade_folder(folder: Path) -> None:
-    require_packages("vedette upgrade", "pyarrow")
-    with interruptible("nothing is lost; the same command goes on"):
-        from vedette.campaigns.upgrading import upgrade_results
-        from vedette.simulation.serialization import FORMAT_VERSION
-
-        number = upgrade_results(folder)
-        if number == FORMAT_VERSION:
-            echo(f"{folder}: format {number}, which this version reads; nothing was changed")
-        else:
-            echo(f"{folder}: format {number} is now {FORMAT_VERSION}")
-            if (tables := folder / "tables").is_dir():
-                echo(f"next: vedette results {folder} --export {tables}, to write its tables anew")
-        emit_json({"folder": folder, "previous_format": number, "format": FORMAT_VERSION})

@@ -118,12 +118,11 @@ class CodeTrust:
 
 def check_planner(scenario: Scenario, name: str, option: str) -> None:
     """Raise a usage error unless the option names a strategy of the scenario."""
-    from vedette.scenarios.renamed import renamed_strategy
     from vedette.scenarios.sections.planners import STRATEGIES
 
     names = (*STRATEGIES, *scenario.model.planners)
     if name not in names:
-        raise usage_error(f"expected one of {', '.join(names)}; got {name!r}{renamed_strategy(name)}", option)
+        raise usage_error(f"expected one of {', '.join(names)}; got {name!r}", option)
 
 
 PlannerName = Annotated[

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import json
 import os
-import shlex
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path as FilePath
@@ -18,7 +16,6 @@ from vedette.scenarios.coastline import coastline_findings
 from vedette.scenarios.diagnostics import Diagnostic, Fault, Path, describe
 from vedette.scenarios.file_checks import BUILTIN_FOLDER, recorded_findings, reference_findings
 from vedette.scenarios.geojson import with_zones
-from vedette.scenarios.renamed import present_key, present_value
 from vedette.scenarios.sections import ScenarioModel
 from vedette.scenarios.sections.base import readable_findings
 from vedette.scenarios.sections.courses import path_in_file
@@ -69,26 +66,7 @@ def locate_fault(document: Document, diagnostic: Diagnostic) -> Fault:
     written_path = path_in_file(_written_path(diagnostic.path, document.data), document.data)
     at_key = diagnostic.got == UNKNOWN_KEY or written_path not in document.value_places
     place = document.place(written_path) if at_key else document.value_place(written_path)
-    is_unknown, value = diagnostic.got == UNKNOWN_KEY, _at(written_path, document.data)
-    present = (present_key(diagnostic.path) or None) if is_unknown else present_value(diagnostic.path, value)
-    hint = diagnostic.hint if present is None or not document.value_places else rewriting(present, document.file)
-    return Fault(place, diagnostic._replace(path=written_path, hint=hint))
-
-
-def rewriting(present: str | bool, file: str) -> str:
-    """Return the hint about a former name in a file: its present name, and the command that rewrites the file."""
-    present = present if isinstance(present, str) else json.dumps(present)
-    return f"now {present}: `vedette upgrade {shlex.quote(file)}` rewrites the file"
-
-
-def _at(path: Path, data: Any) -> Any:
-    """Return the value at a path; None if there is none."""
-    for key in path:
-        try:
-            data = data[key]
-        except (KeyError, IndexError, TypeError):
-            return None
-    return data
+    return Fault(place, diagnostic._replace(path=written_path))
 
 
 def _written_path(path: Path, data: Any) -> Path:

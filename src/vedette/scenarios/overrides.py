@@ -9,7 +9,6 @@ from typing import Any
 from vedette.errors import ScenarioError
 from vedette.scenarios.diagnostics import Path, format_path, shown_key
 from vedette.scenarios.loading import Scenario, diagnose
-from vedette.scenarios.renamed import present_key
 from vedette.scenarios.validation import suggestion
 from vedette.scenarios.yaml_reader import Document
 
@@ -115,8 +114,6 @@ def _keys(holder: Any, place: Path, part: str, path: str) -> tuple[list[Any], st
         )
     if part not in holder:
         hint = "what sensors share is set by sensors.*" if part == "sensor_defaults" else suggestion(part, list(holder))
-        if present := present_key((*place, part)):
-            hint = f"now {present}: `vedette upgrade FILE` rewrites a campaign file"
         known = ", ".join(sorted(holder))
         fault = f"expected one of {known} in {where}, got '{shown_key(part)}'"
         return [], f"{shown_key(path)}: {fault}" + (f" ({hint})" if hint else "")

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Collection, Iterator, Mapping
 from contextlib import contextmanager
 from typing import Any
@@ -29,21 +28,6 @@ from vedette.simulation.tables import (
 # Version of saved runs and campaigns; it changes whenever a table gains, loses or renames a column. A new optional
 # table needs no new version: earlier programs ignore it, and their files stay readable.
 FORMAT_VERSION = 7
-# Used by `vedette.simulation.upgrading`; entries of released formats are never removed. Columns, by their present
-# names, that the tables of a format lack compared with the next, and the values to fill in, NaN if unknown.
-LACKING: dict[int, dict[str, dict[str, float]]] = {5: {"sensors": {"independence_error_bound": math.nan}}, 6: {}}
-# Former names of columns, up to format 6.
-FORMER_COLUMNS: dict[str, dict[str, str]] = {
-    "sensors": {
-        "truncation_error_bound": "discarded_weight_bound",
-        "num_clutter_floored": "num_clutter_raised",
-        "search_truncated": "search_cut",
-        "limit_reached": "cap_met",
-        "independence_error_bound": "factoring_error",
-    },
-    "explanations": {"num_targets_without_bound": "bound_unbounded"},
-    "sensor_gains": {"reward_without_sensor": "without"},
-}
 ENDING = ".arrow"
 _FILES = frozenset(f"{name}{ENDING}" for name in (*LAYOUTS, *OPTIONAL))
 SUMMARY_FILES = frozenset(f"{name}{ENDING}" for name in SUMMARY_TABLES)  # read by `decode_summary`

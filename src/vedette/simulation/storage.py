@@ -12,21 +12,20 @@ import hashlib
 import itertools
 import json
 import platform
-import shlex
 import shutil
 import tempfile
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from functools import cache
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
-from typing import Any, TypeAlias
+from typing import Any
 
 from vedette.errors import InputError
 from vedette.internal.files import unwritable
 from vedette.internal.reading import parse_json, read_file, unreadable
 from vedette.internal.text import printable, shown
 from vedette.simulation.records import RunRecord
-from vedette.simulation.serialization import FORMAT_VERSION, LACKING, decode_run, encode_run, encode_timings
+from vedette.simulation.serialization import FORMAT_VERSION, decode_run, encode_run, encode_timings
 from vedette.simulation.tables import run_facts
 
 FORMAT = "vedette-run"
@@ -108,51 +107,27 @@ def read_files(folder: Path, manifest: Mapping[str, Any]) -> dict[str, bytes]:
     return files
 
 
-# Raises `InputError` for a manifest of another format. Arguments: the manifest, the session with the versions that
-# wrote it, and its path.
-VersionCheck: TypeAlias = Callable[[Mapping[str, Any], Any, Path], None]
-
-
 def check_version(manifest: Mapping[str, Any], session: Any, place: Path) -> None:
     """Raise `InputError` unless a saved run or a campaign has this format; the message says what to do with another."""
-    number = _number(manifest)
-    if number == FORMAT_VERSION:
+    number = manifest.get("format_version")
+    if type(number) is int and number == FORMAT_VERSION:
         return
-    if number in LACKING:
-        command = f"vedette upgrade {shlex.quote(str(place.parent))}"
-        raise InputError(
-            f"{place}: expected format {FORMAT_VERSION}; got {number}, written by an earlier version of this program: "
-            f"`{command}` brings it to this one"
-        )
     writer = session.get("versions") if isinstance(session, dict) else None
     writer = writer.get("vedette") if isinstance(writer, dict) else None
     reader = "the version that wrote it"
     if isinstance(writer, str) and writer != versions()["vedette"]:
         reader = f"vedette {printable(writer)[:40]}"
-    relation = "another" if number is None else "a later" if number > FORMAT_VERSION else "an earlier"
-    got = shown(manifest.get("format_version"))
+    relation = "another" if type(number) is not int else "a later" if number > FORMAT_VERSION else "an earlier"
     raise InputError(
-        f"{place}: expected format {FORMAT_VERSION}; got {got}, written by {relation} version of this program: "
-        f"run it again, or read it with {reader}"
+        f"{place}: expected format {FORMAT_VERSION}; got {shown(number)}, written by {relation} version of this "
+        f"program: run it again, or read it with {reader}"
     )
 
 
-def check_upgradable(manifest: Mapping[str, Any], session: Any, place: Path) -> None:
-    """Raise `InputError` unless a saved run or a campaign has this format, or one that can be upgraded."""
-    if _number(manifest) not in LACKING:
-        check_version(manifest, session, place)
-
-
-def _number(manifest: Mapping[str, Any]) -> int | None:
-    """Return the number of the format; None for an invalid one."""
-    number = manifest.get("format_version")
-    return number if isinstance(number, int) and not isinstance(number, bool) and number > 0 else None
-
-
-def read_manifest(directory: Path | str, check: VersionCheck = check_version) -> dict[str, Any]:
+def read_manifest(directory: Path | str) -> dict[str, Any]:
     """Return the manifest of a saved run: format, versions, run, checksums of its files.
 
-    check: test of the format. Raises `InputError` as `load_run`.
+    Raises `InputError` as `load_run`.
     """
     path = Path(directory) / MANIFEST
     try:
@@ -163,7 +138,7 @@ def read_manifest(directory: Path | str, check: VersionCheck = check_version) ->
         raise InputError(f"{path}: expected the manifest of a run; it is cut short or altered: {error}") from error
     if not isinstance(manifest, dict) or manifest.get("format") != FORMAT:
         raise InputError(f"{path}: expected the manifest of a run; got another file")
-    check(manifest, manifest, path)
+    check_version(manifest, manifest, path)
     if not isinstance(manifest.get("files"), dict) or not isinstance(manifest.get("run"), dict):
         raise InputError(f"{path}: expected the fields files and run; it is cut short or altered")
     return manifest

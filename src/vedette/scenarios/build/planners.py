@@ -12,7 +12,6 @@ from vedette.fusion import Fusion, ParallelUpdate
 from vedette.scenarios.build.sensors import build_scan_times, build_sensors, first_actions
 from vedette.scenarios.build.trackers import has_lmb_beliefs, scene_for_program
 from vedette.scenarios.loading import Scenario
-from vedette.scenarios.renamed import renamed_strategy
 from vedette.scenarios.sections.deciding import Lookahead
 from vedette.scenarios.sections.fusion import FULL_INFORMATION_FUSIONS, SINGLE_BELIEF_FUSIONS, CustomFusion
 from vedette.scenarios.sections.planners import STRATEGIES, NamedIndependent, NamedPlanner, get_strategy
@@ -41,7 +40,7 @@ def build_planner(scenario: Scenario, name: str, num_threads: int = 0) -> Planne
     model, folder = scenario.model, scenario.folder
     if name not in (*STRATEGIES, *model.planners):
         known = ", ".join((*STRATEGIES, *model.planners))
-        raise InputError(f"planner: expected one of {known}; got {name!r}{renamed_strategy(name)}")
+        raise InputError(f"planner: expected one of {known}; got {name!r}")
     sensors = build_sensors(scenario)
     strategy = get_strategy(model, name)
     if reason := strategy.incompatibility(model, labels=has_labels(sensors[0].filter)):
