@@ -181,3 +181,24 @@ def test_views_that_are_missing_or_do_not_fit() -> None:
         InputError, match=r"views.prediction: expected a GLMB, an LMB or a FactoredGLMB, or None; got int"
     ):
         FieldsOfView((model,), np.zeros((1, 3)), (True,), 3)  # type: ignore[arg-type]
+
+
+def test_the_density_of_a_sensor_that_cannot_see_its_own_label_does_not_count() -> None:
+    """The first is surer, but of a place that it does not see; at the place that the second sees both see it."""
+    lmbs = [
+        LMB.from_bernoullis([LABELS[0]], [r], [[x, 0.0]], [9.0 * np.eye(2)]) for r, x in ((0.99, 190.0), (0.5, 120.0))
+    ]
+    fused, _ = Clmb((0.5, 0.5), field_of_view_weighting=True).fuse(lmbs, views([0.9, constant_detection(0.9)]))
+    parts = [moments(each)[LABELS[0]] for each in lmbs]
+    expected = by_hand(np.array([0.5, 0.5]), *zip(*parts, strict=True))
+    own: Any = moments(fused)[LABELS[0]]
+    for found, wanted in zip(own, expected, strict=True):
+        np.testing.assert_allclose(found, wanted, rtol=1e-9)
+
+
+def test_a_sensor_without_a_label_is_no_surer_of_it_than_of_its_least_label() -> None:
+    rng = np.random.default_rng(12)
+    first, second = belief((0.9,), rng, (0,)), belief((1e-6,), rng, (1,))
+    fused, _ = Clmb((0.5, 0.5), missing_existence=1e-3).fuse([first, second])
+    assert fused.existence_logit[0] == pytest.approx(0.5 * (logit(0.9) + logit(1e-6)), rel=1e-12)
+    assert fused.existence_logit[1] == pytest.approx(0.5 * (logit(1e-6) + logit(1e-3)), rel=1e-12)

@@ -129,3 +129,26 @@ def test_sensors_with_other_classes_are_refused() -> None:
     for rule in (Clmb(WEIGHTS), ArithmeticAverage(WEIGHTS)):
         with pytest.raises(InputError, match=r"beliefs: expected one number of classes at all sensors; got \[0, 3\]"):
             rule.fuse([plain[0], own[1]])
+
+
+def test_a_class_that_is_impossible_before_and_after_a_scan_stays_so() -> None:
+    plain, own = lmbs(3, 3)
+
+    def without_first(belief: LMB) -> LMB:
+        probs = np.exp(belief.tracks.log_class_probs)
+        probs[:, 0] = 0.0
+        with np.errstate(divide="ignore"):
+            logs = np.log(probs / probs.sum(axis=1, keepdims=True))
+        return replace(belief, tracks=replace(belief.tracks, log_class_probs=logs))
+
+    own = [without_first(belief) for belief in own]
+    fused = [as_lmb(ParallelUpdate().fuse(own[1:], predicted(own[0]))[0]), rebase(own[0], own[1], own[2])]
+    expected = [as_lmb(ParallelUpdate().fuse(plain[1:], predicted(plain[0]))[0]), rebase(plain[0], plain[1], plain[2])]
+    logs = [belief.tracks.log_class_probs[:, 1:] for belief in own]
+    for found, unclassified, log_products in zip(
+        fused, expected, (logs[1] + logs[2] - logs[0], logs[2] + logs[0] - logs[1]), strict=True
+    ):
+        factors = logsumexp(log_products, axis=1)
+        assert (found.tracks.log_class_probs[:, 0] == -np.inf).all()
+        np.testing.assert_allclose(found.tracks.log_class_probs[:, 1:], log_products - factors[:, None], atol=1e-9)
+        np.testing.assert_allclose(found.existence_logit, unclassified.existence_logit + factors, rtol=1e-9)

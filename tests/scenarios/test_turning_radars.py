@@ -93,6 +93,14 @@ def test_a_line_of_a_turning_radar_may_have_its_velocity(tmp_path: Path) -> None
     np.testing.assert_array_equal(pose[6:8], [3.0, -4.0])
     assert is_turn(pose)
     np.testing.assert_allclose(lags(np.array([0.5]), pose), [-1.0], atol=1e-12)
+    for time in (5.9, 14.1):
+        with pytest.raises(InputError, match=r"line 1, times: expected times within a turn \(4 s\) of `time`; got"):
+            read_message(
+                line.replace(b"[9.0]", f"[{time}]".encode()),
+                "line 1",
+                recorded_sensors(told.scenario.model),
+                told.conventions,
+            )
 
 
 def test_every_row_is_in_one_turn_and_its_time_that_of_the_beam() -> None:
