@@ -165,10 +165,18 @@ def test_sensors_that_cannot_be_switched_off_stay_on_and_too_many_are_named() ->
     assert mask.active is not None
     assert [own.tolist() for own in mask.active.off] == [[0, 1, 2], [3, 4, 5] * 2, [3, 4, 5] * 2]
     assert nearest_feasible(mask, (0, 0, 0)) == (0, 3, 3)
+    assert mask.active.within_limit((0, 0, 0), gains=(0.0, 5.0, 9.0)) == (0, 3, 3)
     never = mask_for(plain, MaxActive(2))
     assert never.active is None
     assert "no more than 2 sensors were to scan, and too few can be switched off" in never.notes[0]
     assert relaxed(never)[0].allows(np.array([[0, 0, 0]]))[0]
+
+
+def test_of_several_limits_the_least_counts() -> None:
+    limits = [MaxActive(3), MaxActive(1), MaxActive(2)]
+    mask = mask_for(switchable(shared(3)), *limits)
+    assert mask.active is not None
+    assert mask.active.limit == 1
 
 
 def vars_of(example: Situation) -> tuple[Any, ...]:

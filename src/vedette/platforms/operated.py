@@ -120,7 +120,7 @@ class Operated:
         """Return (num_actions, num_times) the seconds of scanning left `times` seconds after each action began."""
         lasts, on = self._lasts(pose), self._is_on(actions)[:, np.newaxis]
         scanning = pose[LEFT] - (1.0 - self.refill) * times
-        empty = self.refill * (times - min(lasts, times[-1]))
+        empty = self.refill * (times - lasts)
         found = np.where(on, np.where(times <= lasts, scanning, empty), pose[LEFT] + self.refill * times)
         return np.asarray(np.clip(found, 0.0, self.budget))
 
