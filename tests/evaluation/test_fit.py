@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import json
 import re
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -13,11 +14,10 @@ import pytest
 
 from recordings import write_recording
 from vedette.evaluation.fit import Finding, Fit, fit_of_run
-from vedette.evaluation.innovations import SensorFit, sensor_fits
+from vedette.evaluation.innovations import Assumed, Instant, compared, joined
 from vedette.evaluation.runs import run_scenario, track_recording
 from vedette.evaluation.scans import rows_of_record
 from vedette.scenarios import Scenario, parse_scenario, replace_fields
-from vedette.scenarios.build import build_sensors
 from vedette.scenarios.from_recording import scenario_from_recording
 from vedette.simulation.storage import read_manifest, save_run
 
@@ -80,26 +80,28 @@ def test_innovations_are_those_of_a_kalman_filter() -> None:
         }
     )
     record = run_scenario(scenario, "stationary", seed=0)
-    [sensor] = build_sensors(scenario)
     scans = rows_of_record(record, scenario)
-    [fit] = sensor_fits(record, scans, (sensor.filter.sensor,), sensor.filter.targets.motion)
+    instants = map(Instant, record.times.tolist(), record.poses, scans, record.estimates)
+    models = Assumed.of(scenario)
+    fits = (compared(*pair, models).fits[0] for pair in pairwise(instants))
+    fit = joined(each for each in fits if each is not None)
     transition = np.eye(4) + np.diag([1.0, 1.0], 2)
     start = next(k for k, each in enumerate(record.estimates) if len(each.means))
     mean, cov = record.estimates[start].means[0], record.estimates[start].covs[0]
-    process = sensor.filter.targets.motion.noise_cov(mean, 1.0)
-    assert len(fit.matches) == record.num_scans - start - 1
-    for k, match in enumerate(fit.matches, start=start + 1):
+    process = models.motion.noise_cov(mean, 1.0)
+    matches = zip(fit.matches.innovations, fit.matches.variances, strict=True)
+    assert len(fit.matches.labels) == record.num_scans - start - 1
+    for k, (innovation, variances) in enumerate(matches, start=start + 1):
         mean, cov = transition @ mean, transition @ cov @ transition.T + process
         scan = scans[k][0]
         assert scan is not None
-        assert match.innovation is not None
         spread = cov[:2, :2] + 400.0 * np.eye(2)
-        np.testing.assert_allclose(match.innovation, scan[0] - mean[:2], atol=1e-4)
-        np.testing.assert_allclose(match.cov, spread, rtol=1e-5)
+        np.testing.assert_allclose(innovation, scan[0] - mean[:2], atol=1e-4)
+        np.testing.assert_allclose(variances, np.diagonal(spread), rtol=1e-5)
         gain = cov[:, :2] @ np.linalg.inv(spread)
-        mean, cov = mean + gain @ match.innovation, cov - gain @ spread @ gain.T
+        mean, cov = mean + gain @ innovation, cov - gain @ spread @ gain.T
     np.testing.assert_allclose(fit.noise_stds, 20.0)
-    assert fit.unexplained == 0
+    assert fit.counts.sum() == 0
 
 
 def test_a_right_model_has_no_finding() -> None:
@@ -122,7 +124,6 @@ def test_a_fault_is_named_with_its_sensor_and_size(test: str) -> None:
 def test_without_tracks_nothing_is_searched() -> None:
     fit = fit_with({"time.num_steps": 1})
     assert fit.searched == "nothing, as no track spans two scans"
-    assert SensorFit().matches == []
 
 
 def test_row_noise_counts(tmp_path: Path) -> None:

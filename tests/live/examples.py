@@ -73,3 +73,20 @@ def answered(live: LiveLoop, lines: list[bytes]) -> list[bytes]:
         state, answers = live.process(state, one)
         found += map(encode_line, answers)
     return found
+
+
+def crossing(num: int, seed: int = 0, drift: float = 0.0) -> list[bytes]:
+    """Both sensors see three targets at every second; x of the first drifts by `drift` m/s from 60 s on, to 60 m."""
+    rng, lines = np.random.default_rng(seed), []
+    starts, velocities = (
+        np.array([[-700.0, 200.0], [600.0, 500.0], [0.0, -600.0]]),
+        np.array([[5, 1], [-5, -2], [1, 5]]),
+    )
+    for k in range(num):
+        moved = [min(max(0.0, drift * (k - 60.0)), 60.0), 0.0]
+        for s in (1, 2):
+            seen = (starts + k * velocities)[rng.random(3) < 0.9]
+            false = rng.uniform(-1000.0, 1000.0, (rng.poisson(1.0), 2))
+            rows = np.vstack([seen + rng.normal(0.0, 10.0, seen.shape), false]) + (moved if s == 1 else [0.0, 0.0])
+            lines.append(line(s, float(k), rows.tolist()))
+    return lines

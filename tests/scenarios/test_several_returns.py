@@ -10,11 +10,12 @@ import numpy as np
 import pytest
 
 from vedette.errors import ScenarioError
+from vedette.evaluation.fit import fit_of_run
 from vedette.evaluation.runs import run_scenario
-from vedette.evaluation.unexplained_courses import unexplained_course_warnings
 from vedette.recorded import RecordedScans, RecordedSensor
 from vedette.recorded.merging import merged
 from vedette.recorded.returns import Extent, ReturnsModel, extents_of
+from vedette.scenarios import Scenario
 from vedette.scenarios.from_recording import RecordingScenario, scenario_from_recording
 from vedette.scenarios.warnings import scenario_warnings
 
@@ -125,9 +126,15 @@ def test_an_extent_below_zero_is_refused(tmp_path: Path) -> None:
 MIXED = np.array([[2000.0, 3000.0, 2.0, -1.0], [-4000.0, 1000.0, 0.0, 3.0], [9000.0, -8000.0, -200.0, 100.0]])
 
 
+def fast_targets(scenario: Scenario) -> tuple[str, ...]:
+    """Findings of fast targets."""
+    fit = fit_of_run(run_scenario(scenario, "stationary", seed=0), scenario)
+    return tuple(each.text for each in fit.findings if each.test == "fast targets")
+
+
 def test_unexplained_measurements_of_fast_targets_are_reported(tmp_path: Path) -> None:
     found = recorded(tmp_path, 1.0, targets=MIXED)
-    (line,) = unexplained_course_warnings(run_scenario(found.scenario, "stationary", seed=0), found.scenario)
+    (line,) = fast_targets(found.scenario)
     speed = math.hypot(200.0, 100.0)
     low, high = (float(word) for word in line.split("courses at ")[1].split(" m/s")[0].split(" to "))
     assert low == pytest.approx(speed, rel=0.03)
@@ -136,7 +143,7 @@ def test_unexplained_measurements_of_fast_targets_are_reported(tmp_path: Path) -
     assert re.match(rf"R: \d+ measurements that no track explains {where}", line)
     assert "new tracks are expected at about 10 m/s: give `--max-target-speed 250`" in line
     fast = scenario_from_recording(tmp_path / "radar.yaml", tmp_path / "scans.csv", speed=300.0)
-    assert unexplained_course_warnings(run_scenario(fast.scenario, "stationary", seed=0), fast.scenario) == ()
+    assert fast_targets(fast.scenario) == ()
 
 
 def test_clutter_alone_is_not_taken_for_fast_targets(tmp_path: Path) -> None:
@@ -147,7 +154,7 @@ def test_clutter_alone_is_not_taken_for_fast_targets(tmp_path: Path) -> None:
     (tmp_path / "scans.csv").write_text("\n".join([*rows, ""]), "utf-8")
     (tmp_path / "radar.yaml").write_text(SENSORS % "", "utf-8")
     found = scenario_from_recording(tmp_path / "radar.yaml", tmp_path / "scans.csv")
-    assert unexplained_course_warnings(run_scenario(found.scenario, "stationary", seed=0), found.scenario) == ()
+    assert fast_targets(found.scenario) == ()
 
 
 def test_a_camera_is_read_with_a_radar_and_refused_alone(tmp_path: Path) -> None:

@@ -48,11 +48,13 @@ def _parse_source(address: str) -> Source:
 
 
 def print_answers(answers: Iterable[dict[str, Any]]) -> None:
-    """Print each answer as a line of JSON."""
+    """Print each answer as a line of JSON, and findings of the fit on the terminal, too."""
     from vedette.live import encode_line
 
     for answer in answers:
         echo(encode_line(answer).decode(), nl=False)
+        for word, text in ((kind, each) for kind in ("new", "gone") for each in answer.get("fit", {}).get(kind, ())):
+            note(f"fit, {word}: {text}")
 
 
 async def listen_to(

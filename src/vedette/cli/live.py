@@ -220,4 +220,5 @@ def _document(persistent: PersistentLoop) -> dict[str, Any]:
         "dropped": timeline.num_dropped,
         "repeated": timeline.num_repeated,
         "decisions": state.num_decisions,
+        "fit": state.fit.fit.to_dict(),
     }

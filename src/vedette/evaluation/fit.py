@@ -4,33 +4,35 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
+from itertools import pairwise
 from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import ArrayLike
 
-from vedette.evaluation.innovations import Match, SensorFit, by_label, sensor_fits
+from vedette.evaluation.block_means import BLOCK, SURE, blocks, mean_of
+from vedette.evaluation.innovations import Assumed, Compared, Instant, Matches, SensorFit, compared, joined
+from vedette.evaluation.scan_periods import period_findings
 from vedette.evaluation.scans import rows_of_record
 from vedette.evaluation.sensor_agreement import disagreement_warnings
 from vedette.evaluation.unexplained_courses import unexplained_course_warnings
 from vedette.internal.quantities import QUANTITIES
 from vedette.internal.text import pluralise
-from vedette.kernels.base.types import Floats
-from vedette.models.sensor import SensorModel
+from vedette.kernels.base.types import Ints
 from vedette.recorded.stationary import stationary_places
 from vedette.scenarios import Scenario
-from vedette.scenarios.build import build_sensors
 from vedette.scenarios.sections.recording import recorded_sensors, returns_models
 from vedette.simulation.records import RunRecord
 
-_SURE = 6.0  # standard errors of a finding; of independent blocks, as errors are correlated in time
-_BLOCK = 10  # successive matches of a track in one block
-_MIN_BLOCKS = 5
+NOTHING = "nothing, as no track spans two scans"
+_TESTS = "bias, noise, motion, detection, several returns, clutter, periods, agreement of sensors, fast targets"
+_MOST_SCANS, _STRETCH = 5000, 100  # that are looked at, in stretches of successive ones
 _LEAST_BIAS = 0.25  # of the noise's standard deviation; smaller ones cost no accuracy
 _SPREADS = (0.6, 1.5)  # of the assumed standard deviation; no finding within them
 _LEAST_DIFFERENCE = 0.1  # of the share of detected targets
-_RETURNS = 0.1  # further measurements a track and scan
+_RETURNS = 0.3  # further measurements of a target in a scan; a convoy has some, too
 _LEAST_EXCESS = 0.5  # unexplained measurements a scan above the clutter rate; and as a share of it
-_MANY_PLACES = 3  # stationary places; fewer may be targets at rest
+_MANY_PLACES = 5  # stationary places; fewer may be targets at rest
 _EDGE = 3  # matches at each end of a track, which depend on what was detected
 
 
@@ -74,46 +76,47 @@ class Fit(NamedTuple):
         return [f"no fault found; searched: {self.searched}"]
 
 
-class _Mean(NamedTuple):
-    """Mean of some values and its standard error from blocks."""
-
-    value: float
-    error: float
-
-    def away_from(self, value: float) -> float:
-        """Return the distance to a value in standard errors."""
-        return abs(self.value - value) / max(self.error, 1e-300)
-
-
 def fit_of_run(record: RunRecord, scenario: Scenario) -> Fit:
     """Return what the assumed model does not explain in a run.
 
-    Filters of labelled tracks are needed; for others, and for runs of one scan, nothing is searched. Raises
-    `VedetteError` for scans that cannot be read or drawn again.
+    Filters of labelled tracks are needed; for others, and for runs of one scan, nothing is searched. Of a long run
+    stretches of successive scans are looked at. Raises `VedetteError` for scans that cannot be read or drawn again.
     """
-    if record.num_scans < 2 or not any(each.labels.size for each in record.estimates):
-        return Fit((), "nothing, as no track spans two scans")
-    filters = [each.filter for each in build_sensors(scenario)]
-    names = scenario.model.sensor_names
-    models = tuple(each.sensor for each in filters)
-    fits = sensor_fits(record, rows_of_record(record, scenario), models, filters[0].targets.motion)
-    findings = [Finding("agreement", "", text) for text in disagreement_warnings(record, scenario)]
-    for name, fit, model in zip(names, fits, models, strict=True):
-        findings += (Finding(test, name, f"{name}: {text}") for test, text in _of_sensor(fit, model, len(names)))
-    findings += (Finding("fast targets", "", text) for text in unexplained_course_warnings(record, scenario))
-    findings += _stationary_findings(scenario)
-    num = sum(len(fit.matches) for fit in fits)
-    tests = "bias, noise, motion, detection, several returns, clutter"
-    if scenario.model.recording is not None:
-        tests += ", agreement of sensors, fast targets, stationary echoes"
-    return Fit(tuple(findings), f"{tests} ({num} pairs of a track and a scan)")
+    rows, assumed = rows_of_record(record, scenario), Assumed.of(scenario)
+    instants = list(map(Instant, record.times.tolist(), record.poses, rows, record.estimates))
+    part = 1 + (len(instants) - 1) // _MOST_SCANS
+    pairs = (pair for k, pair in enumerate(pairwise(instants)) if k // _STRETCH % part == 0)
+    times = [record.times[[instant[s] is not None for instant in rows]] for s in range(record.num_sensors)]
+    fit = fit_of([compared(*pair, assumed) for pair in pairs], assumed, times)
+    if scenario.model.recording is None:
+        return fit
+    return Fit((*fit.findings, *_stationary_findings(scenario)), f"stationary echoes, {fit.searched}")
+
+
+def fit_of(instants: Sequence[Compared], assumed: Assumed, times: Sequence[ArrayLike] | None = None) -> Fit:
+    """Return what the assumed model does not explain in some instants, in order of time.
+
+    times: of all scans of each sensor in a run, s; None: the instants are a window of the latest scans.
+    """
+    if not any(len(each.labels) for each in instants):
+        return Fit((), NOTHING)
+    names, kinds = assumed.scenario.model.sensor_names, [x.measurement.kind for x in assumed.scenario.model.sensors]
+    findings, num = [Finding("agreement", "", text) for text in disagreement_warnings(instants, names, kinds)], 0
+    for s, name in enumerate(names):
+        if fits := [fit for each in instants if (fit := each.fits[s]) is not None]:
+            fit = joined(fits)
+            num += len(fit.matches.labels)
+            findings += (Finding(test, name, f"{name}: {text}") for test, text in _of_sensor(fit, s, assumed))
+    findings += (Finding("fast targets", "", text) for text in unexplained_course_warnings(instants, assumed))
+    scanned = times or [[each.time for each in instants if each.fits[s] is not None] for s in range(len(names))]
+    findings += (Finding("period", *each) for each in period_findings(scanned, names, from_start=times is not None))
+    return Fit(tuple(findings), f"{_TESTS} ({num} pairs of a track and a scan)")
 
 
 def _stationary_findings(scenario: Scenario) -> Iterator[Finding]:
     """Yield findings of places that a sensor measures all through a recording."""
     model = scenario.model
-    if model.recording is None:
-        return
+    assert model.recording is not None
     recording = model.recording.build(model, scenario.folder)
     for s, (site, own) in enumerate(zip(recorded_sensors(model), returns_models(model), strict=True)):
         places, masks = stationary_places(recording, s, site, own)
@@ -127,32 +130,36 @@ def _stationary_findings(scenario: Scenario) -> Iterator[Finding]:
             )
 
 
-def _of_sensor(fit: SensorFit, model: SensorModel, num_sensors: int) -> Iterator[tuple[str, str]]:
+def _of_sensor(fit: SensorFit, s: int, assumed: Assumed) -> Iterator[tuple[str, str]]:
     """Yield the findings of a sensor as test and text."""
+    tracks, model = fit.matches.by_label(), assumed.sensors[s]
     if components := model.measurement.components:
-        yield from _innovation_findings(fit, components, num_sensors)
-    yield from _detection_findings(fit)
-    yield from _clutter_findings(fit, model.clutter.rate)
+        yield from _innovation_findings(fit, tracks, components, len(assumed.sensors))
+    yield from _detection_finding(fit.matches, tracks)
+    yield from _count_findings(fit, model.clutter.rate)
 
 
-def _innovation_findings(fit: SensorFit, components: Sequence[str], num_sensors: int) -> Iterator[tuple[str, str]]:
+def _innovation_findings(
+    fit: SensorFit, tracks: Sequence[Ints], components: Sequence[str], num_sensors: int
+) -> Iterator[tuple[str, str]]:
     """Yield findings of bias, noise and motion, one for each component at most."""
-    tracks = [[each for each in track if each.innovation is not None] for track in by_label(fit.matches)]
-    for i, (name, noise) in enumerate(zip(components, fit.noise_stds, strict=True)):
+    measured = [track[~np.isnan(fit.matches.innovations[track, 0])] for track in tracks]
+    for i, (name, noise) in enumerate(zip(components, fit.noise_stds.tolist(), strict=True)):
         quantity = QUANTITIES[name]
-        own = [np.array([_component(each, i) for each in track]).reshape(-1, 2) for track in tracks]
-        mean, squares = _mean([each[:, 0] for each in own]), _mean([each[:, 0] ** 2 / each[:, 1] for each in own])
+        own = [(fit.matches.innovations[track, i], fit.matches.variances[track, i]) for track in measured]
+        mean = mean_of(blocks([errors for errors, _ in own]), drifts=True)
+        squares = mean_of(blocks([errors**2 / variances for errors, variances in own]))
         spread = math.sqrt(squares.value)
-        lag = _mean([each[1:, 0] * each[:-1, 0] / each[1:, 1] for each in own])
-        if num_sensors > 1 and mean.away_from(0.0) > _SURE and abs(mean.value) > _LEAST_BIAS * noise:
+        lag = mean_of(blocks([errors[1:] * errors[:-1] / variances[1:] for errors, variances in own]))
+        if num_sensors > 1 and mean.is_surely(0.0, _LEAST_BIAS * noise):
             yield (
                 "bias",
                 f"{_plural(name)} are {_signed(name, mean.value)} off its tracks ({mean.away_from(0.0):.0f} standard "
                 "errors): `vedette track --calibrate` estimates it",
             )
-        elif squares.away_from(1.0) <= _SURE or _SPREADS[0] <= spread <= _SPREADS[1]:
+        elif not squares.is_surely(1.0, 0.0) or _SPREADS[0] <= spread <= _SPREADS[1]:
             continue
-        elif lag.value > 0.3 * squares.value and lag.away_from(0.0) > _SURE and spread > 1.0:
+        elif lag.is_surely(0.0, 0.0) and lag.value > 0.3 * squares.value and spread > 1.0:
             yield (
                 "motion",
                 f"errors of {_plural(name)} continue from scan to scan (correlation {lag.value / squares.value:.1f}): "
@@ -167,63 +174,38 @@ def _innovation_findings(fit: SensorFit, components: Sequence[str], num_sensors:
             )
 
 
-def _component(match: Match, i: int) -> tuple[float, float]:
-    assert match.innovation is not None
-    return float(match.innovation[i]), float(match.cov[i, i])
-
-
-def _detection_findings(fit: SensorFit) -> Iterator[tuple[str, str]]:
-    """Yield findings of the probability of detection and of several measurements of a target."""
-    tracks = [track[_EDGE:-_EDGE] for track in by_label(fit.matches) if len(track) > 4 * _EDGE]
-    likely = [
-        np.array([1.0 - (1.0 - each.probability) * math.exp(-each.by_chance) for each in track]) for track in tracks
-    ]
-    made = [np.array([each.num_inside > 0 for each in track], float) for track in tracks]
-    excess = _mean([a - b for a, b in zip(made, likely, strict=True)])
-    if abs(excess.value) > _LEAST_DIFFERENCE and excess.away_from(0.0) > _SURE:
-        assumed = _mean(likely).value
+def _detection_finding(matches: Matches, tracks: Sequence[Ints]) -> Iterator[tuple[str, str]]:
+    """Yield a finding of the probability of detection."""
+    inner = [track[_EDGE:-_EDGE] for track in tracks if len(track) > 4 * _EDGE]
+    likely = 1.0 - (1.0 - matches.probabilities) * np.exp(-matches.by_chance)
+    excess = mean_of(blocks([(matches.numbers > 0)[track] - likely[track] for track in inner]))
+    if excess.is_surely(0.0, _LEAST_DIFFERENCE):
+        assumed = mean_of(blocks([likely[track] for track in inner])).value
         yield (
             "detection",
             f"detects its tracks in {assumed + excess.value:.0%} of scans where {assumed:.0%} is assumed: `vedette "
             "track --calibrate` estimates it",
         )
-    more = _mean(
-        [
-            np.array([max(each.num_inside - 1, 0) - each.probability * each.by_chance for each in track], float)
-            for track in tracks
-        ]
-    )
-    if more.value > _RETURNS and more.away_from(0.0) > _SURE:
+
+
+def _count_findings(fit: SensorFit, rate: float) -> Iterator[tuple[str, str]]:
+    """Yield findings of several measurements of a target, which may have several tracks, and of those at no track."""
+    further = mean_of(np.add.reduceat(fit.further, np.arange(0, len(fit.further), BLOCK), axis=0))
+    if further.value > 0.0 and further.is_surely(0.0, _RETURNS):
         yield (
             "several returns",
-            f"tracks have {more.value:.1f} further measurements a scan beside them, more than clutter explains: if a "
-            "target gives several returns, give the sensor its `extent` in m",
+            f"targets have {further.value:.1f} further measurements a scan beside them, more than clutter explains: if "
+            "a target gives several returns, give the sensor its `extent` in m",
         )
-
-
-def _clutter_findings(fit: SensorFit, rate: float) -> Iterator[tuple[str, str]]:
-    """Yield a finding of the number of measurements that no track explains."""
-    expected, found = rate * fit.num_scans, fit.unexplained
-    error = math.sqrt(max(expected, 1.0))
-    least = max(_LEAST_EXCESS * expected, _LEAST_EXCESS * fit.num_scans)
-    if abs(found - expected) > max(least, _SURE * error):
+    num_scans, found = len(fit.counts), int(fit.counts.sum())
+    expected = rate * num_scans
+    least = _LEAST_EXCESS * max(expected, num_scans)
+    if abs(found - expected) > max(least, SURE * math.sqrt(max(expected, 1.0))):
         yield (
             "clutter",
-            f"{found / fit.num_scans:.2g} measurements a scan lie beside all tracks, where clutter of {rate:.2g} is "
+            f"{found / num_scans:.2g} measurements a scan lie beside all tracks, where clutter of {rate:.2g} is "
             "assumed: `vedette track --calibrate` estimates it",
         )
-
-
-def _mean(tracks: Sequence[Floats]) -> _Mean:
-    """Return the mean of all values, with an error from blocks of successive values of a track; infinite for few."""
-    blocks = [block for each in tracks for block in np.split(each, range(_BLOCK, len(each), _BLOCK)) if len(block)]
-    if len(blocks) < _MIN_BLOCKS:
-        return _Mean(0.0, math.inf)
-    sums, sizes = np.array([block.sum() for block in blocks]), np.array([len(block) for block in blocks])
-    mean = float(sums.sum() / sizes.sum())
-    residuals = sums - mean * sizes
-    variance = float((residuals**2).sum()) * len(blocks) / (len(blocks) - 1)
-    return _Mean(mean, math.sqrt(variance) / float(sizes.sum()))
 
 
 def _plural(name: str) -> str:

@@ -1,154 +1,209 @@
-"""Innovations of a run: measurements against the tracks as predicted from the scan before."""
+"""Innovations: measurements against the tracks as predicted from the scan before."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
-from dataclasses import dataclass, field
-from typing import NamedTuple, TypeAlias
+from collections.abc import Callable, Iterable, Sequence
+from typing import NamedTuple
 
 import numpy as np
+from scipy.sparse.csgraph import connected_components
 
 from vedette.densities import Estimate
-from vedette.evaluation.scans import Rows
-from vedette.kernels.base.types import Bools, Floats
+from vedette.kernels.base.types import Bools, Floats, Ints
 from vedette.models.measurement import wrap_periodic
 from vedette.models.motion import MotionModel
 from vedette.models.row_noise import measured_part, noise_of_rows
 from vedette.models.sensor import SensorModel
-from vedette.simulation.records import RunRecord
+from vedette.scenarios import Scenario
 
 GATE = 4.0  # standard deviations of the innovation
-_MOST_SCANS = 5000  # of a sensor; of a longer run as many are looked at, evenly spread
 _STEP = 1e-4  # of central differences, as a share of the standard deviation of a state component
 _SINGLE = 1.5  # gates between two tracks that are not confused
+_MIN_DETECTION = 0.3  # lowest probability of detection at which a scan should contain the target
 
-Label: TypeAlias = tuple[int, ...]
+
+class Assumed(NamedTuple):
+    """A scenario with the models of its sensors and of the targets' motion, which tests compare with the scans."""
+
+    scenario: Scenario
+    sensors: tuple[SensorModel, ...]
+    motion: MotionModel
+
+    @classmethod
+    def of(cls, scenario: Scenario) -> Assumed:
+        """Build the models; raises `InputError` for custom models that cannot be loaded."""
+        model, folder = scenario.model, scenario.folder
+        region, method, at = model.region.build(), model.filter.gaussian_method, model.filter.detection_at
+        sensors = tuple(each.build(region, method, folder, at) for each in model.sensors)
+        return cls(scenario, sensors, model.motion.build(folder, method=method))
 
 
-class Match(NamedTuple):
-    """A track at a scan of a sensor that should contain it, with no other track near.
+class Instant(NamedTuple):
+    """A time of a run at which sensors scanned.
 
-    label: of the track. probability: of a detection. num_inside: measurements within the gate. by_chance: expected
-    number of them that are clutter. innovation: (meas_dim,) of the only measurement inside, and None if there is not
-    exactly one; cov: (meas_dim, meas_dim) of it.
+    time: s. poses: (num_sensors, 3 or more). rows: measurements of each sensor, with the noise that rows bring; None
+    without a scan. estimate: of the targets after these scans.
     """
 
-    label: Label
-    probability: float
-    num_inside: int
-    by_chance: float
-    innovation: Floats | None
-    cov: Floats
+    time: float
+    poses: Floats
+    rows: Sequence[Floats | None]
+    estimate: Estimate
 
 
-@dataclass(slots=True)
-class SensorFit:
+class Matches(NamedTuple):
+    """Tracks at scans of a sensor that should contain them, with no other track near, in order of time.
+
+    labels: (num, 2). probabilities: (num,) of a detection. numbers: (num,) measurements within the gate. by_chance:
+    (num,) expected number of them that are clutter. innovations: (num, meas_dim) of the only measurement inside, NaN if
+    there is not exactly one; variances: of them. noise: (num, meas_dim) variances of the noise alone.
+    """
+
+    labels: Ints
+    probabilities: Floats
+    numbers: Ints
+    by_chance: Floats
+    innovations: Floats
+    variances: Floats
+    noise: Floats
+
+    @classmethod
+    def none(cls, dim: int) -> Matches:
+        """Return no matches of a sensor of `dim` components."""
+        flat, wide = np.empty(0), np.empty((0, dim))
+        return cls(np.empty((0, 2), np.int64), flat, flat.astype(np.int64), flat, wide, wide, wide)
+
+    def by_label(self) -> list[Ints]:
+        """Return the indices of the matches of each track, in order of time."""
+        _, track = np.unique(self.labels, axis=0, return_inverse=True)
+        order = np.argsort(track, kind="stable")
+        return np.split(order, np.flatnonzero(np.diff(track[order])) + 1) if len(order) else []
+
+
+class SensorFit(NamedTuple):
     """Measurements of a sensor, compared with what its model expects.
 
-    Attributes:
-        matches: tracks at the sensor's scans, in order of time.
-        variances: sums of the variances of the noise over the matches, (meas_dim,).
-        num_scans: scans that were looked at.
-        unexplained: measurements in the gate of no track, over these scans.
+    counts: (num_scans,) measurements in the gate of no track, in the scans that were looked at. further: (num_scans, 2)
+    measurements in gates above one for each group of near tracks, and these groups. matches: tracks at these scans.
+    unexplained: (num, 2) positions relative to the sensor, m, of measurements in the gate of no track; NaN of sensors
+    that measure no positions.
     """
 
-    matches: list[Match] = field(default_factory=list)
-    variances: Floats = field(default_factory=lambda: np.zeros(0))
-    num_scans: int = 0
-    unexplained: int = 0
+    counts: Ints
+    further: Floats
+    matches: Matches
+    unexplained: Floats
 
     @property
     def noise_stds(self) -> Floats:
         """Root mean square noise of each component over the matches, (meas_dim,)."""
-        return np.asarray(np.sqrt(self.variances / max(len(self.matches), 1)))
+        return np.asarray(np.sqrt(self.matches.noise.sum(axis=0) / max(len(self.matches.noise), 1)))
 
 
-class _Predicted(NamedTuple):
-    labels: list[Label]
-    means: Floats
-    covs: Floats
+class Compared(NamedTuple):
+    """An instant, compared with the tracks as predicted from the instant before.
 
-
-def sensor_fits(
-    record: RunRecord,
-    scans: Rows,
-    sensors: tuple[SensorModel, ...],
-    motion: MotionModel,
-) -> tuple[SensorFit, ...]:
-    """Return for each sensor its measurements against the tracks of a run.
-
-    A track is predicted from its estimate at the scan before, with the motion model; its measurement and Jacobian are
-    linearised there (Kalman innovations). Scans of one time are compared with one prediction.
-
-    Args:
-        record: the run.
-        scans: its scans, as `vedette.evaluation.scans.rows_of_record` returns them.
-        sensors: the models of the sensors that the filters assume.
-        motion: of the targets.
+    time: s. own: (num_sensors, 2) positions of the sensors, m. labels: (n, 2) of the tracks. means: (n, 2) their
+    positions, m. detected: (n, num_sensors) 1 if a measurement lies in the gate, 0 if none does although one should, -1
+    for no scan, or a track out of view. fits: of the sensors; None without a scan.
     """
-    fits = tuple(SensorFit(variances=np.zeros(each.meas_dim)) for each in sensors)
-    for k in np.unique(np.linspace(1, record.num_scans - 1, min(_MOST_SCANS, record.num_scans - 1)).astype(int)):
-        before, dt = record.estimates[k - 1], float(record.times[k] - record.times[k - 1])
-        predicted = _predicted(before, record.estimates[k], motion, dt)
-        for s, (fit, sensor, scan) in enumerate(zip(fits, sensors, scans[k], strict=True)):
-            if scan is not None:
-                _add_scan(fit, sensor, scan, record.poses[k, s], predicted)
-    return fits
+
+    time: float
+    own: Floats
+    labels: Ints
+    means: Floats
+    detected: Ints
+    fits: tuple[SensorFit | None, ...]
 
 
-def _predicted(before: Estimate, after: Estimate, motion: MotionModel, dt: float) -> _Predicted:
-    """Return the tracks of two successive estimates, predicted from the first to the time of the second."""
-    present = set(map(tuple, after.labels.tolist()))
-    labels = list(map(tuple, before.labels.tolist()))
-    kept = [i for i, label in enumerate(labels) if label in present]
-    means, covs, labels = before.means[kept], before.covs[kept], [labels[i] for i in kept]
+def joined(fits: Iterable[SensorFit]) -> SensorFit:
+    """Return the fit of all scans of one or more fits of a sensor."""
+    counts, further, matches, unexplained = zip(*fits, strict=True)
+    columns = Matches(*(np.concatenate(each) for each in zip(*matches, strict=True)))
+    return SensorFit(np.concatenate(counts), np.concatenate(further), columns, np.concatenate(unexplained))
+
+
+def compared(before: Instant, now: Instant, assumed: Assumed) -> Compared:
+    """Return an instant compared with the one before it.
+
+    A track is predicted from its estimate at the instant before, with the motion model; its measurement and Jacobian
+    are linearised there (Kalman innovations). Scans of one time are compared with one prediction.
+    """
+    labels, means, covs = _predicted(before, now, assumed.motion)
+    detected, fits = np.full((len(labels), len(now.rows)), -1), list[SensorFit | None]()
+    for s, (sensor, rows, pose) in enumerate(zip(assumed.sensors, now.rows, now.poses, strict=True)):
+        if rows is None:
+            fits.append(None)
+            continue
+        fit, probabilities, is_measured = _of_scan(sensor, rows, pose, labels, means, covs)
+        fits.append(fit)
+        detected[:, s] = np.where(probabilities >= _MIN_DETECTION, is_measured, -1)
+    return Compared(now.time, now.poses[:, :2], labels, means[:, :2], detected, tuple(fits))
+
+
+def _predicted(before: Instant, now: Instant, motion: MotionModel) -> tuple[Ints, Floats, Floats]:
+    """Return labels, means and covariances of the tracks of both estimates, predicted to the time of the second."""
+    estimate, dt = before.estimate, now.time - before.time
+    present = set(map(tuple, now.estimate.labels.tolist()))
+    kept = [i for i, label in enumerate(estimate.labels.tolist()) if tuple(label) in present]
+    labels, means, covs = estimate.labels[kept], estimate.means[kept], estimate.covs[kept]
     if not kept or dt <= 0.0:
-        return _Predicted(labels, means, covs)
-    jacobians = _jacobians(lambda states: motion.propagate(states, dt), means, covs, None)
-    moved = jacobians @ covs @ jacobians.transpose(0, 2, 1) + motion.noise_covs(means, dt)
-    return _Predicted(labels, motion.propagate(means, dt), moved)
+        return labels, means, covs
+    moved, jacobians = _linearised(lambda states: motion.propagate(states, dt), means, covs, None)
+    return labels, moved, jacobians @ covs @ jacobians.transpose(0, 2, 1) + motion.noise_covs(means, dt)
 
 
-def _jacobians(function: Callable[[Floats], Floats], means: Floats, covs: Floats, periods: Floats | None) -> Floats:
-    """Return the Jacobians of a function of (n, dim) states by central differences, (n, out_dim, dim)."""
+def _linearised(
+    function: Callable[[Floats], Floats], means: Floats, covs: Floats, periods: Floats | None
+) -> tuple[Floats, Floats]:
+    """Return a function of (n, dim) states there, (n, out_dim), and its Jacobians by central differences."""
     steps = _STEP * np.sqrt(np.diagonal(covs, axis1=1, axis2=2))
-    columns = []
-    for i in range(means.shape[1]):
-        shift = np.zeros_like(means)
-        shift[:, i] = steps[:, i]
-        change = function(means + shift) - function(means - shift)
-        change = change if periods is None else wrap_periodic(change, periods)
-        columns.append(change / (2.0 * steps[:, i, None]))
-    return np.stack(columns, axis=2)
+    num, dim = means.shape
+    shifts = steps[:, np.newaxis] * np.eye(dim)
+    states = np.concatenate([means[:, np.newaxis], means[:, np.newaxis] + shifts, means[:, np.newaxis] - shifts], 1)
+    values = function(states.reshape(-1, dim)).reshape(num, 1 + 2 * dim, -1)
+    change = values[:, 1 : 1 + dim] - values[:, 1 + dim :]
+    if periods is not None:
+        change = wrap_periodic(change.reshape(num * dim, -1), periods).reshape(change.shape)
+    return values[:, 0], (change / (2.0 * steps[..., np.newaxis])).transpose(0, 2, 1)
 
 
-def _add_scan(fit: SensorFit, sensor: SensorModel, raw: Floats, pose: Floats, predicted: _Predicted) -> None:
-    """Add a scan of a sensor, with the noise of its rows if they bring any, to the fit."""
-    fit.num_scans += 1
-    measured = measured_part(raw, sensor.meas_dim)
-    labels, means, covs = predicted
-    if not labels:
-        fit.unexplained += len(measured)
-        return
-    periods = sensor.measurement.periods
-    expected, noise = sensor.measurement.measure(means, pose), sensor.noise.covs(means, pose, sensor.meas_dim)
-    jacobians = _jacobians(lambda states: sensor.measurement.measure(states, pose), means, covs, periods)
-    moved = jacobians @ covs @ jacobians.transpose(0, 2, 1)
-    spread = moved + noise
-    of_rows = np.array([noise_of_rows(raw, np.repeat(each[None], len(raw), axis=0)) for each in noise])
-    spreads = moved[:, None] + of_rows.reshape(len(noise), len(raw), *noise.shape[1:])
-    inside = _inside(measured, expected, spreads, periods)
-    fit.unexplained += int((~inside.any(axis=0)).sum())
-    chance = _by_chance(sensor, expected, spread, pose)
-    probabilities = sensor.mean_detection(means, covs, pose)
-    alone = _alone(expected, spread, periods)
-    for i in np.flatnonzero(alone).tolist():
-        own = np.flatnonzero(inside[i])
-        residual = wrap_periodic(measured[own] - expected[i], periods)[0] if len(own) == 1 else None
-        cov = spreads[i, own[0]] if len(own) == 1 else spread[i]
-        fit.matches.append(Match(labels[i], float(probabilities[i]), len(own), float(chance[i]), residual, cov))
-        fit.variances += np.diagonal(noise[i])
+def _of_scan(
+    sensor: SensorModel, raw: Floats, pose: Floats, labels: Ints, means: Floats, covs: Floats
+) -> tuple[SensorFit, Floats, Bools]:
+    """Return the fit of a scan, the probabilities of detection of the tracks, and whether they have measurements.
+
+    raw: measurements, with the noise of each if they bring any.
+    """
+    measured, periods = measured_part(raw, sensor.meas_dim), sensor.measurement.periods
+    matches, explained = Matches.none(sensor.meas_dim), np.asarray(np.zeros(len(measured), np.bool_))
+    probabilities, numbers, further = np.empty(0), np.empty(0, np.int64), np.zeros((1, 2))
+    if len(labels):
+        expected, jacobians = _linearised(lambda states: sensor.measurement.measure(states, pose), means, covs, periods)
+        noise = sensor.noise.covs(means, pose, sensor.meas_dim)
+        moved = jacobians @ covs @ jacobians.transpose(0, 2, 1)
+        of_rows = np.array([noise_of_rows(raw, np.repeat(each[None], len(raw), axis=0)) for each in noise])
+        spread, spreads = moved + noise, moved[:, None] + of_rows.reshape(len(noise), len(raw), *noise.shape[1:])
+        inside = _inside(measured, expected, spreads, periods)
+        explained, numbers = np.asarray(inside.any(axis=0)), inside.sum(axis=1)
+        residuals, variances = np.full(expected.shape, np.nan), np.diagonal(spread, axis1=1, axis2=2).copy()
+        single = np.flatnonzero(numbers == 1)
+        own = inside[single].argmax(axis=1) if len(single) else single
+        residuals[single] = wrap_periodic(measured[own] - expected[single], periods)
+        variances[single] = np.diagonal(spreads[single, own], axis1=1, axis2=2)
+        probabilities, chance = sensor.mean_detection(means, covs, pose), _by_chance(sensor, expected, spread, pose)
+        noises = np.diagonal(noise, axis1=1, axis2=2)
+        columns = labels, probabilities, numbers, chance, residuals, variances, noises
+        num, group = connected_components(_near(expected, spread, periods))
+        matches = Matches(*(np.asarray(each)[np.bincount(group)[group] == 1] for each in columns))
+        likely = np.zeros(num)
+        np.maximum.at(likely, group, probabilities)
+        further = np.array([[explained.sum() - likely.sum() - chance.sum(), num]])
+    beside = np.full((int((~explained).sum()), 2), np.nan)
+    if sensor.measurement.places is not None:
+        beside = sensor.measurement.positions(measured[~explained], pose) - pose[:2]
+    return SensorFit(np.array([len(beside)]), further, matches, beside), probabilities, numbers > 0
 
 
 def _inside(measured: Floats, expected: Floats, spread: Floats, periods: Floats, gate: float = GATE) -> Bools:
@@ -161,10 +216,10 @@ def _inside(measured: Floats, expected: Floats, spread: Floats, periods: Floats,
     return np.asarray(distances <= gate**2)
 
 
-def _alone(expected: Floats, spread: Floats, periods: Floats) -> Bools:
-    """Return True for each track without another one that could take its measurement."""
+def _near(expected: Floats, spread: Floats, periods: Floats) -> Bools:
+    """Return True for each pair of tracks that could take the same measurement, (n, n)."""
     near = _inside(expected, expected, np.repeat(spread[:, None], len(expected), axis=1), periods, _SINGLE * GATE)
-    return np.asarray((near | near.T).sum(axis=1) == 1)
+    return np.asarray(near | near.T)
 
 
 def _by_chance(sensor: SensorModel, expected: Floats, spread: Floats, pose: Floats) -> Floats:
@@ -173,11 +228,3 @@ def _by_chance(sensor: SensorModel, expected: Floats, spread: Floats, pose: Floa
     ball = math.pi ** (dim / 2.0) / math.gamma(dim / 2.0 + 1.0) * GATE**dim
     volumes = ball * np.sqrt(np.linalg.det(spread))
     return np.asarray(volumes * np.exp(sensor.clutter.log_intensity_at(expected, pose)))
-
-
-def by_label(matches: list[Match]) -> Iterator[list[Match]]:
-    """Yield the matches of each track, in order of time."""
-    groups: dict[Label, list[Match]] = {}
-    for match in matches:
-        groups.setdefault(match.label, []).append(match)
-    yield from groups.values()

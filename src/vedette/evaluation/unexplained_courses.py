@@ -1,21 +1,18 @@
-"""Unexplained measurements of a recording on straight courses: targets faster than assumed."""
+"""Unexplained measurements on straight courses: targets faster than assumed."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
 
-from vedette.evaluation.scans import PLANE_SHAPES, scans_of_record
-from vedette.evaluation.sensor_agreement import in_gate, noise_stds
-from vedette.internal.quantities import HEIGHT_DEPENDENT, PLACED
+from vedette.evaluation.innovations import Assumed, Compared
 from vedette.internal.text import pluralise
 from vedette.kernels.base.types import Bools, Floats
-from vedette.recorded.extents import places_of
-from vedette.scenarios import Scenario
-from vedette.simulation.records import RunRecord
+from vedette.models.sensor import SensorModel
 
 _GATE = 4.0  # standard deviations of the third measurement as predicted from two
 _MAX_SPEED = 1500.0  # m/s
@@ -44,26 +41,20 @@ class _Course(NamedTuple):
     speed: float
 
 
-def unexplained_course_warnings(record: RunRecord, scenario: Scenario) -> tuple[str, ...]:
+def unexplained_course_warnings(instants: Sequence[Compared], assumed: Assumed) -> tuple[str, ...]:
     """Return a warning for each sensor whose unexplained measurements follow each other on straight courses.
 
-    A measurement is unexplained if no estimate of its scan lies within four standard deviations. Three measurements of
-    successive scans are on one course if the difference of the last two equals that of the first two, within the noise.
-    The expected number of courses by chance is a hundredth. Only courses faster than births assume count. Raises
-    `VedetteError` for a recording that cannot be read.
+    Three measurements of successive scans that no track explains are on one course if the difference of the last two
+    equals that of the first two, within the noise. The expected number of courses by chance is a hundredth. Only
+    courses faster than births from measurements assume count.
     """
-    model = scenario.model
-    births = model.birth.from_measurements
-    kinds = [sensor.measurement.kind for sensor in model.sensors]
-    placed = [s for s, kind in enumerate(kinds) if kind in PLACED and kind not in HEIGHT_DEPENDENT]
-    if model.recording is None or births is None or not placed:
+    model, warnings = assumed.scenario.model, list[str]()
+    if (births := model.birth.from_measurements) is None:
         return ()
-    assumed, warnings, scans = max(births.std[2:4]), list[str](), _unexplained_scans(record, scenario, placed)
-    box = model.region.build()
-    for s in placed:
-        courses = _courses(scans[s], _SPEED_FACTOR * assumed, box.area)
-        if courses:
-            warnings.append(_warning(courses, model.sensor_names[s], record.poses[0, s, :2], assumed))
+    speed, area = max(births.std[2:4]), model.region.build().area
+    for s, (name, sensor) in enumerate(zip(model.sensor_names, assumed.sensors, strict=True)):
+        if courses := _courses(_unexplained_scans(instants, s, sensor), _SPEED_FACTOR * speed, area):
+            warnings.append(_warning(courses, name, instants[0].own[s], speed))
     return tuple(warnings)
 
 
@@ -79,25 +70,17 @@ def _warning(courses: list[_Course], name: str, sensor_position: Floats, assumed
     return f"{name}: {finding}, and new tracks are expected at about {assumed:g} m/s: give {advice} for such targets"
 
 
-def _unexplained_scans(record: RunRecord, scenario: Scenario, placed: list[int]) -> dict[int, list[_UnexplainedScan]]:
-    """Return for each sensor its scans, with only the measurements that no estimate explains."""
-    sensors, stds = scenario.model.sensors, noise_stds(scenario, placed)
-    unexplained: dict[int, list[_UnexplainedScan]] = {s: [] for s in placed}
-    for k, (scans, estimate) in enumerate(zip(scans_of_record(record, scenario), record.estimates, strict=True)):
-        for s in placed:
-            scan, pose, kind = scans[s], record.poses[k, s], sensors[s].measurement.kind
-            if scan is None:
-                continue
-            places = estimate.means[:, :2], estimate.covs[:, :2, :2]
-            explained = in_gate(scan.measurements, kind, stds[s], pose, *places).any(axis=0)
-            measurements = scan.measurements[~explained]
-            place_stds = np.full(len(measurements), stds[s].max())
-            if PLANE_SHAPES[kind] == "point":
-                place_stds = np.maximum(stds[s][1], stds[s][0] * measurements[:, 1])
-            unexplained[s].append(
-                _UnexplainedScan(float(record.times[k]), places_of(measurements, pose, kind), place_stds)
-            )
-    return unexplained
+def _unexplained_scans(instants: Sequence[Compared], s: int, sensor: SensorModel) -> list[_UnexplainedScan]:
+    """Return the scans of a sensor, with only the measurements that no track explains."""
+    least, scans = sensor.noise.least_stds, list[_UnexplainedScan]()
+    stds = np.zeros(2) if least is None else np.asarray(least)[:2]
+    for instant in instants:
+        if (fit := instant.fits[s]) is not None and sensor.measurement.places is not None:
+            place_stds = np.full(len(fit.unexplained), stds.max())
+            if sensor.measurement.components[:1] == ("bearing",):
+                place_stds = np.maximum(stds[1], stds[0] * np.hypot(*fit.unexplained.T))
+            scans.append(_UnexplainedScan(instant.time, fit.unexplained + instant.own[s], place_stds))
+    return scans
 
 
 def _courses(scans: list[_UnexplainedScan], slowest: float, area: float) -> list[_Course]:

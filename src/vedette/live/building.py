@@ -9,6 +9,7 @@ import numpy as np
 
 from vedette.control import ConstraintReportingPlanner, RequiresTruth
 from vedette.errors import InputError
+from vedette.evaluation.innovations import Assumed
 from vedette.internal.quantities import COMPONENTS
 from vedette.live.loop import LiveLoop
 from vedette.models.arguments import reject
@@ -76,6 +77,7 @@ def build_live_loop(
         classes=tuple(model.classes),
         valid_area=box_of(model.region.build().corners),
         extents=tuple(returns.extent or 0.0 for returns in returns_models(model)),
+        assumed=Assumed.of(live_scenario.scenario),
     )
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import math
 from bisect import bisect_right
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any, TypeAlias
 
 import numpy as np
@@ -13,9 +13,11 @@ import numpy as np
 from vedette.control import Planner
 from vedette.densities import Estimator
 from vedette.errors import VedetteError
+from vedette.evaluation.innovations import Assumed
 from vedette.evaluation.track_formats import utc_text
 from vedette.internal.quantities import COMPONENTS, HEIGHT_DEPENDENT, PLACED
 from vedette.kernels.base.types import Floats
+from vedette.live.fit import LiveFit
 from vedette.live.messages import Message, read_message
 from vedette.models.arguments import reject
 from vedette.models.row_noise import measured_part
@@ -49,6 +51,7 @@ class LiveState:
         due: time of the next decision in s; inf: none.
         num_decisions: number of decisions so far.
         spreads: fields of `vedette.recorded.merging.Spread` for the returns of each sensor.
+        fit: of the assumed model to the latest scans.
     """
 
     timeline: Timeline
@@ -62,6 +65,7 @@ class LiveState:
     due: float = math.inf
     num_decisions: int = 0
     spreads: tuple[tuple[float, ...], ...] = ()
+    fit: LiveFit = field(default_factory=LiveFit)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -88,6 +92,7 @@ class LiveLoop:
             out and counted in the answer as `beyond`. None: no limit.
         extents: for each sensor, the largest distance in m between neighbouring returns of a target; 0: returns are
             not merged.
+        assumed: models that are tested against the latest scans; None: no tests.
     """
 
     tracker: OutOfSequenceTracker
@@ -104,6 +109,7 @@ class LiveLoop:
     classes: tuple[str, ...] = ()
     valid_area: Floats | None = None
     extents: tuple[float, ...] = ()
+    assumed: Assumed | None = None
 
     @property
     def compass(self) -> Compass | None:
@@ -143,10 +149,24 @@ class LiveLoop:
         except Exception as error:  # custom code may raise anything; the loop continues with the next line
             text = str(error) if isinstance(error, VedetteError) else error_cause(error)
             return _error_answer(state, text if text.startswith(place) else f"{place}: {text}")
+        processed, remarks = self._tested(state, processed)
         if self._is_due(processed):
             processed, plan = self._decide(processed)
-            return processed, (answer, plan)
-        return processed, (answer,)
+            return processed, (answer, *remarks, plan)
+        return processed, (answer, *remarks)
+
+    def _tested(self, before: LiveState, after: LiveState) -> tuple[LiveState, tuple[Answer, ...]]:
+        """Return the state with its fit to the instants that left the timeline, and an answer if findings changed."""
+        if self.assumed is None:
+            return after, ()
+        try:
+            fit = before.fit.continued(before.timeline, after.timeline, self.estimate, self.assumed)
+        except Exception as error:  # of custom models; tests never stop the stream
+            fit = LiveFit(searched=f"nothing, as {error_cause(error)}")
+        new, gone = fit.without(before.fit.fit.findings), before.fit.without(fit.fit.findings)
+        remark = {"line": after.num_lines, **self._line_time(after, after.timeline.newest or 0.0)}
+        remark["fit"] = {"new": [x.text for x in new], "gone": [x.text for x in gone], **fit.fit.to_dict()}
+        return replace(after, fit=fit), (remark,) if new or gone else ()
 
     def _drop_invalid(self, scan: SensorScan) -> tuple[SensorScan, int]:
         """Return the scan without measurements outside `valid_area` or the sensor's reach, and the number removed."""

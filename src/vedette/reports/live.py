@@ -137,6 +137,7 @@ class LiveScreen:
             "scans": self._scans(timeline, decimals),
             "decision": self._decision_data(poses),
             "health": self._health(timeline),
+            "fit": state.fit.fit.lines(),
             # Time since the latest scan of each sensor, s, by the clock of the scans; None before its first.
             "silence": [None if math.isinf(last) else round(newest - last, 3) for last in state.latest],
             "fault": self._fault,

@@ -27,7 +27,8 @@ FORMAT_NAME = "vedette-snapshot"
 FORMAT_VERSION = 1
 
 # Packages whose data classes may occur in a file; they hold arrays and open no files.
-_PACKAGES = ("densities", "filters", "fusion", "tracking", "models", "control", "calibration", "kernels.base")
+_PACKAGES: tuple[str, ...] = ("densities", "filters", "fusion", "tracking", "models", "control", "calibration")
+_PACKAGES += ("kernels.base", "evaluation.fit", "evaluation.innovations", "live.fit")
 _BITS = {kind.__name__: kind for kind in (np.random.PCG64, np.random.PCG64DXSM, np.random.SFC64, np.random.Philox)}
 _PLAIN = (bool, int, str, type(None))
 

@@ -50,7 +50,7 @@ function startLive(root, run) {
     tellLoop(frame);
   }
 
-  function tellLoop({ health, silence, scans, counts, fault }) {
+  function tellLoop({ health, fit, silence, scans, counts, fault }) {
     part("sensors").replaceChildren(...run.sensors.map(({ name }, s) => {
       const row = element("tr");
       const before = silence[s] === null ? "none yet" : fixed(silence[s], 1);
@@ -58,6 +58,7 @@ function startLive(root, run) {
       return row;
     }));
     part("health").textContent = health && `Health over the latest scans: ${health}.`;
+    part("fit").replaceChildren(...fit.map((line) => element("p", "", `Fit over the latest scans: ${line}.`)));
     part("counts").textContent = Object.entries(counts).map(([name, count]) => `${name}: ${count}`).join(", ");
     part("fault").textContent = fault && `Last line that was not taken: ${fault}`;
   }
