@@ -32,7 +32,7 @@ def test_a_regression_is_solved_and_its_information_found(seed: int) -> None:
     np.testing.assert_allclose(found.terms, -0.5 * (came - factors @ found.at) ** 2)
     scores = (came - factors @ found.at)[:, None] * factors
     spread = np.std(found.scores - scores, axis=0) / np.std(scores, axis=0)
-    assert (spread < 0.2).all()  # extrapolated along each parameter from where the last step began
+    assert (spread < 0.2).all()  # of where the last step began
     np.testing.assert_allclose(np.diag(found.information), np.diag(exact), rtol=0.15)
     cov, lost = covariance(found.information, UNKNOWN)
     np.testing.assert_allclose(np.sqrt(np.diag(cov)), stds, rtol=0.1)

@@ -200,10 +200,11 @@ def _judged(
     """Return the estimate of each parameter with its interval, or with the reason why there is none.
 
     cov, lost: results of `covariance`. apart: sensors that share no targets with the others. least: standard deviations
-    if all associations were known, which second derivatives miss where the likelihood jumps. blocks: of the terms.
+    of all but biases with known associations, which second derivatives miss where the likelihood jumps. blocks: of the
+    terms.
     """
     found, stds = [], np.maximum(np.sqrt(np.diag(cov)), stds_from_blocks(maximum.scores, cov, blocks))
-    stds = np.maximum(stds, least)
+    stds = np.where([each.kind == "bias" for each in problem.parameters], stds, np.maximum(stds, least))
     for i, (each, free) in enumerate(zip(problem.parameters, maximum.at.tolist(), strict=True)):
         partners = [j for j in np.flatnonzero(np.abs(lost[i]) > _PART).tolist() if j != i]
         compared = each.kind == "bias" and each.sensor in apart and each.component in _COMPARED

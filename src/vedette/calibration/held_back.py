@@ -40,7 +40,7 @@ def held_back_gains(
 
     def change_of_blocks(point: Floats, reset: Floats, exact: bool) -> Floats:
         if exact:
-            return np.bincount(blocks, terms(point) - terms(reset))
+            return np.asarray(np.bincount(blocks, terms(point) - terms(reset)), np.float64)
         drops = [0.5 * float(step @ maximum.information @ step) for step in (point - maximum.at, reset - maximum.at)]
         return np.asarray(sums @ (point - reset) + (drops[1] - drops[0]) / len(sums))
 
@@ -51,8 +51,8 @@ def held_back_gains(
         for reset in resets:
             reset[list(group)] = start[list(group)]
         for exact in (False, True):
-            halves = [change_of_blocks(*pair, exact) for pair in zip(points, resets, strict=True)]
-            changes = np.where(np.arange(len(sums)) % 2 == 1, *halves)
+            first, second = (change_of_blocks(*pair, exact) for pair in zip(points, resets, strict=True))
+            changes = np.where(np.arange(len(sums)) % 2 == 1, first, second)
             gain, error = float(changes.sum()), float(np.sqrt(len(changes)) * changes.std(ddof=1))
             if gain <= error:
                 points = resets

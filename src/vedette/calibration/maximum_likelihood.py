@@ -34,9 +34,9 @@ _ALIKE = 1.5  # largest ratio of the curvature over a step and the curvature tha
 class Maximum(NamedTuple):
     """Maximum over p parameters on their scales.
 
-    at: (p,) parameters. terms: (num_terms,) there. scores: (num_terms, p) their derivatives, extrapolated along each
-    parameter over a last step that needed none. information: (p, p) minus the second derivatives of the sum.
-    converged: whether a further step promises next to nothing.
+    at: (p,) parameters. terms: (num_terms,) there. scores: (num_terms, p) their derivatives, of where a short last step
+    began. information: (p, p) minus the second derivatives of the sum. converged: whether a further step promises next
+    to nothing.
     """
 
     at: Floats
@@ -120,17 +120,16 @@ def maximise(
         size = float(np.abs(way / errors).max())
         if converged := size < _ENOUGH:
             break
-        before, length = search.values.sum(), float(way @ information @ way)
+        before, length = float(search.values.sum()), float(way @ information @ way)
         share = search.advance(way)
         if not share and (far or size < _JUMPS):
             converged = size < _JUMPS
             break
         if converged := share == 1.0 and size < _ENOUGH / _LEFT and length < _FAR * len(way):
-            scores = scores - search.bends * way
             break
         # One-sided differences, or a curvature from far away, may be too inexact.
         promised = share * float(way @ scores.sum(axis=0)) - 0.5 * share**2 * length
-        far = share**2 * length > _FAR * len(way) or search.values.sum() - before <= _KEPT * promised
+        far = share**2 * length > _FAR * len(way) or float(search.values.sum()) - before <= _KEPT * promised
     for scale, weak in ((unknown, _WEAK), (1.0 / np.sqrt(np.diag(information)), _CORRELATED)):
         information = _refined(terms, search.at, float(search.values.sum()), information, unknown, scale, weak)
     return Maximum(search.at, search.values, scores, information, converged)
