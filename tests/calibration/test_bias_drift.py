@@ -67,9 +67,8 @@ def test_each_window_has_the_bias_of_its_middle(problem: Problem) -> None:
         estimates = window.calibration.estimates
         values = part.free([each.value if each.is_better else each.parameter.start for each in estimates])
         own = replace(part, recording=part.recording.between(window.begin, window.end))
-        assert own.log_likelihoods(values).sum() == pytest.approx(
-            window.calibration.log_likelihood, abs=0.1
-        )  # other births
+        total = own.log_likelihoods(values).sum()
+        assert total == pytest.approx(window.calibration.log_likelihood, abs=0.5)  # with its own rate of births
 
 
 def test_one_window_is_the_whole_recording(problem: Problem) -> None:
