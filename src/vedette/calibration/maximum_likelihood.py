@@ -125,11 +125,12 @@ def maximise(
         if not share and (far or size < _JUMPS):
             converged = size < _JUMPS
             break
-        if converged := share == 1.0 and size < _ENOUGH / _LEFT and length < _FAR * len(way):
-            break
-        # One-sided differences, or a curvature from far away, may be too inexact.
         promised = share * float(way @ scores.sum(axis=0)) - 0.5 * share**2 * length
-        far = share**2 * length > _FAR * len(way) or float(search.values.sum()) - before <= _KEPT * promised
+        gained, far = float(search.values.sum()) - before, share**2 * length > _FAR * len(way)
+        # One-sided differences, or a curvature from far away, may be too inexact.
+        far = far or not _KEPT * promised < gained < promised / _KEPT + _JUMPS
+        if converged := not far and share == 1.0 and size < _ENOUGH / _LEFT:
+            break
     for scale, weak in ((unknown, _WEAK), (1.0 / np.sqrt(np.diag(information)), _CORRELATED)):
         information = _refined(terms, search.at, float(search.values.sum()), information, unknown, scale, weak)
     return Maximum(search.at, search.values, scores, information, converged)
