@@ -58,9 +58,7 @@ def test_halves_are_scored_as_if_each_were_fitted_alone() -> None:
     def terms(x: Floats) -> Floats:
         return -0.5 * (came - factors @ x) ** 2
 
-    maximum = Maximum(
-        best, terms(best), (came - factors @ best)[:, None] * factors, factors.T @ factors, np.ones(2), True
-    )
+    maximum = Maximum(best, terms(best), (came - factors @ best)[:, None] * factors, factors.T @ factors, True)
     found = held_back_gains(terms, maximum, cov, np.zeros(2), [[0, 1]], BLOCKS)[0][0]
     total = 0.0
     for half in (0, 1):

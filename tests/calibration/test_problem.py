@@ -26,7 +26,7 @@ def problem(folder: Path, clutter: str, more: str = "") -> tuple[Problem, Any, A
     (folder / "radars.yaml").write_text(text, "utf-8")
     scenario = scenario_from_recording(folder / "radars.yaml", folder / "scans.csv").scenario
     found = build_problem(scenario)
-    tracker, rates = found.tracker(found.values(found.free([each.start for each in found.parameters])))
+    tracker, rates = found.tracker(found.values(found.free([each.start for each in found.parameters])), found.births)
     assert isinstance(tracker, Central)
     return found, (tracker, rates), build_sensors(scenario)
 
@@ -63,7 +63,7 @@ def test_false_measurements_do_not_pay_for_a_bias(tmp_path: Path, clutter: str) 
     for i, each in enumerate(found.parameters):
         if each.kind == "bias" and each.component in ("range", "bearing"):
             values[i] = {"range": 250.0, "bearing": 3.0}[each.component]
-    biased, _ = found.tracker(values)
+    biased, _ = found.tracker(values, found.births)
     assert isinstance(biased, Central)
     raw = np.array([[0.6, 2500.0], [-1.0, 800.0]])
     corrected = raw - [-math.radians(3.0), 250.0]  # clockwise

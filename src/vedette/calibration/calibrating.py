@@ -5,13 +5,13 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from functools import partial
+from functools import cache
 from typing import NamedTuple
 
 import numpy as np
 
 from vedette.calibration.held_back import blocks_of_time, held_back_gains
-from vedette.calibration.initial_guess import NO_SHARED, initial_guess
+from vedette.calibration.initial_guess import NO_SHARED, Guess, initial_guess
 from vedette.calibration.maximum_likelihood import (
     Maximum,
     Terms,
@@ -26,7 +26,6 @@ from vedette.kernels.base.types import Floats, Ints
 _QUANTILE = 1.959964  # of the normal distribution, 97.5 %
 _COMPARED = ("clock", "x", "y")  # components that are relative to those of the first sensor
 _NO_BETTER = "held-back scans fit no better with the estimate"
-_SHORT = 1.0  # log likelihood by which a search with fixed parameters may exceed the full search
 _PART = 0.1  # share of a parameter in undetermined directions above which it is not identifiable
 _MOST_PRIORS = 5.0  # prior standard deviations within which an estimate is plausible
 _KINDS = ("clutter", "detection", "noise", "bias")  # in the order of their tests; those of a sensor are a group
@@ -86,58 +85,67 @@ def calibrate(
     Raises:
         VedetteError: a filter cannot process the recording.
     """
-
-    said = problem.free([each.start for each in problem.parameters])
+    given = problem.free([each.start for each in problem.parameters])
     asked = [i for i, each in enumerate(problem.parameters) if only is None or each in only]
+    guess = initial_guess(problem, given, asked, progress)
+    problem = replace(problem, births=guess.births)
 
-    def terms(free: Floats, own: Sequence[int]) -> Floats:
+    @cache
+    def terms(free: bytes) -> Floats:
         progress()
-        whole = said.copy()
-        whole[own] = free
-        return problem.log_likelihoods(whole)
+        return problem.log_likelihoods(np.frombuffer(free))
 
-    before = float(terms(said[asked], asked).sum())
-    guess = initial_guess(problem, said, asked, progress)
-    apart = [s for group in guess.groups if group != guess.groups[0] or len(group) == 1 for s in group]
+    before, converged, rank = float(terms(given.tobytes()).sum()), True, 0
     found = {i: _without(problem.parameters[i], f"not identifiable: {why}") for i, why in guess.held.items()}
-    own = free = [i for i in asked if i not in found]
-    if not free:
-        return Calibration(tuple(found[i] for i in asked), before, before, True, 0)
-    start, blocks = said.copy(), blocks_of_time(problem.term_times())
+    free = [i for i in asked if i not in found]
+    if free:
+        estimates, converged, rank = _estimated(problem, terms, guess, given, free)
+        found |= estimates
+    kept, better = tuple(found[i] for i in asked), given.copy()
+    if converged:
+        better[asked] = [
+            each.parameter.to_free(each.value if each.is_better else each.parameter.start) for each in kept
+        ]
+    else:  # second derivatives away from a maximum are not the information
+        kept = tuple(each._replace(ci_low=math.nan, ci_high=math.nan) for each in kept)
+    return Calibration(kept, float(terms(better.tobytes()).sum()), before, converged, rank)
+
+
+def _estimated(
+    problem: Problem, terms: Callable[[bytes], Floats], guess: Guess, given: Floats, free: list[int]
+) -> tuple[dict[int, ParameterEstimate], bool, int]:
+    """Return the estimates of the free parameters, whether the search converged, and the rank of the information.
+
+    terms: of the bytes of all parameters. given: (num_parameters,) their assumed values on their scales.
+    """
+    start, blocks, found = given.copy(), blocks_of_time(problem.term_times()), dict[int, ParameterEstimate]()
     start[free] = guess.free[free]
-    highest, again, ranks = math.inf, False, list[int]()
+    own, ranks = free, list[int]()
+
+    def of_own(at: Floats) -> Floats:
+        whole = given.copy()
+        whole[own] = at
+        return terms(whole.tobytes())
+
     while True:
         part = replace(problem, parameters=tuple(problem.parameters[i] for i in own))
         unknown = np.array([each.unknown for each in part.parameters])
-        of_own = partial(terms, own=own)
-        if float(of_own(start[own]).sum()) < before:
-            start[own] = said[own]
+        if of_own(start[own]).sum() < of_own(given[own]).sum():
+            start[own] = given[own]
         maximum = maximise(of_own, start[own], unknown, _correlated(part.parameters), blocks, guess.stds[own])
         cov, lost = covariance(maximum.information, unknown)
-        if not again and maximum.log_likelihood > highest + _SHORT:
-            # Higher with fixed parameters: the full search stopped short of its maximum; restart it from here, once.
-            start[own], own, again = maximum.at, free, True
-            ranks.clear()
-            continue
-        highest = maximum.log_likelihood
-        judged = _judged(part, maximum, cov, lost, apart, blocks)
+        judged = _judged(part, maximum, cov, lost, guess.apart, guess.stds[own], blocks)
         found |= zip(own, judged, strict=True)
         ranks.append(len(own) - round(float(np.trace(lost))))
         told = [i for i in own if not found[i].reason]
         if told == own or not told:
             break
         # Fix parameters that are not identifiable at the assumed values, and maximise over the others.
-        start[own] = conditional_maximum(maximum, unknown, [i not in told for i in own], said[own])
+        start[own] = conditional_maximum(maximum, unknown, [i not in told for i in own], given[own])
         own = told
     if told and maximum.converged:
         found |= zip(own, _compared_with_given(part, judged, of_own, maximum, cov, blocks), strict=True)
-    kept = tuple(found[i] for i in asked)
-    if not maximum.converged:  # second derivatives away from a maximum are not the information
-        kept = tuple(each._replace(ci_low=math.nan, ci_high=math.nan) for each in kept)
-    better = [each.value if each.is_better and maximum.converged else each.parameter.start for each in kept]
-    free_values = [each.parameter.to_free(value) for each, value in zip(kept, better, strict=True)]
-    log_likelihood = float(terms(np.array(free_values), asked).sum())
-    return Calibration(kept, log_likelihood, before, maximum.converged, ranks[0])
+    return found, maximum.converged, ranks[0]
 
 
 def _compared_with_given(
@@ -187,14 +195,16 @@ def _correlated(parameters: tuple[Parameter, ...]) -> list[list[int]]:
 
 
 def _judged(
-    problem: Problem, maximum: Maximum, cov: Floats, lost: Floats, apart: Sequence[int], blocks: Ints
+    problem: Problem, maximum: Maximum, cov: Floats, lost: Floats, apart: Sequence[int], least: Floats, blocks: Ints
 ) -> tuple[ParameterEstimate, ...]:
     """Return the estimate of each parameter with its interval, or with the reason why there is none.
 
-    cov, lost: results of `covariance`. apart: sensors that share no targets with the others. blocks: of the terms.
+    cov, lost: results of `covariance`. apart: sensors that share no targets with the others. least: standard deviations
+    of all but biases with known associations, which second derivatives miss where the likelihood jumps. blocks: of the
+    terms.
     """
     found, stds = [], np.maximum(np.sqrt(np.diag(cov)), stds_from_blocks(maximum.scores, cov, blocks))
-    stds = np.maximum(stds, maximum.stds)
+    stds = np.where([each.kind == "bias" for each in problem.parameters], stds, np.maximum(stds, least))
     for i, (each, free) in enumerate(zip(problem.parameters, maximum.at.tolist(), strict=True)):
         partners = [j for j in np.flatnonzero(np.abs(lost[i]) > _PART).tolist() if j != i]
         compared = each.kind == "bias" and each.sensor in apart and each.component in _COMPARED

@@ -12,7 +12,9 @@ from vedette.calibration.parameters import Problem
 from vedette.calibration.registration import (
     BIASES,
     MOST_FITTED,
+    SCANS_A_PIECE,
     MatchedMeasurements,
+    Registration,
     fitted,
     groups_with_common_targets,
     is_one_place,
@@ -25,6 +27,9 @@ from vedette.kernels.base.types import Floats
 _LONG = 10  # scans of a track whose share of detections counts
 _UNEVEN = 4.0  # dispersion above which targets are not detected equally often
 _NEARER = 3.0  # multiple of the estimated noise, in the next round
+_MANY_SCANS = 20  # of a long straight piece
+_LASTING = 2.0  # ratio of errors about long and short pieces above which errors last; of white noise 1.1 to 1.7
+_BIRTHS = 0.5, 5.0  # births and scans that the gamma prior of their rate counts for, as in tracking
 NO_SHARED = "no other sensor observes enough of the same targets"
 _OTHER_MOTION = "another motion of the targets than assumed"
 _BY_MOTION = {  # biases that need a second sensor at another place: effect that looks the same without one
@@ -37,14 +42,16 @@ _BY_MOTION = {  # biases that need a second sensor at another place: effect that
 class Guess(NamedTuple):
     """Initial guess.
 
-    free, stds: values of all parameters on their scales, and expected standard deviations. groups: of sensors that
-    share targets. held: parameters that stay at their start values, and why they are not identifiable.
+    free, stds: values of all parameters on their scales, and expected standard deviations. apart: sensors that share no
+    targets with the others. held: parameters that stay at their start values, and why they are not identifiable.
+    births: expected births per scan.
     """
 
     free: Floats
     stds: Floats
-    groups: list[list[int]]
+    apart: list[int]
     held: dict[int, str]
+    births: float
 
 
 def initial_guess(problem: Problem, said: Floats, asked: Sequence[int], progress: Callable[[], None]) -> Guess:
@@ -61,11 +68,12 @@ def initial_guess(problem: Problem, said: Floats, asked: Sequence[int], progress
         if each.kind == "bias" and each.component in BIASES:
             places[i] = at = each.sensor, BIASES.index(each.component)
             unknown[at] = each.unknown / abs(each.per_si)
-    stds = _widest(problem, values, asked)
+    stds, births = _widest(problem, values, asked), problem.births
     for _ in range(3):
         recording = problem.without_biases(values)
         progress()
-        pairs = match_measurements(problem.tracker(_with_noise(problem, values, stds, wide))[0], recording, sites, stds)
+        tracker, _ = problem.tracker(_with_noise(problem, values, stds, wide), births)
+        pairs = match_measurements(tracker, recording, sites, stds)
         groups = groups_with_common_targets(pairs, len(sites))
         by_motion = _biases_by_motion(problem, pairs, groups)
         fitting = np.zeros(unknown.shape, bool)
@@ -76,12 +84,15 @@ def initial_guess(problem: Problem, said: Floats, asked: Sequence[int], progress
             each = problem.parameters[i]
             values[i] = each.start if i in by_motion else values[i] + each.per_si * found.biases[at]
         stds = np.minimum(stds, _NEARER * found.stds)
+        births = (_BIRTHS[0] + pairs.in_view.shape[1]) / (_BIRTHS[1] + len(recording.times))
     values = _with_counts(problem, _with_noise(problem, values, found.stds, None), pairs)
     expected = _expected_stds(problem, values, pairs)
     for i, at in places.items():
         expected[i] = abs(problem.parameters[i].per_si) * found.bias_stds[at]
-    held = {i: why for i, why in (by_motion | _uneven_detection(problem, pairs)).items() if i in asked}
-    return Guess(problem.free(values.tolist()), expected, groups, held)
+    apart = [s for group in groups if group != groups[0] or len(group) == 1 for s in group]
+    reasons = by_motion | _uneven_detection(problem, pairs) | _lasting(problem, pairs, apart, found)
+    held = {i: why for i, why in reasons.items() if i in asked}
+    return Guess(problem.free(values.tolist()), expected, apart, held, births)
 
 
 def _widest(problem: Problem, values: Floats, asked: Sequence[int]) -> Floats:
@@ -177,6 +188,24 @@ def _uneven_detection(problem: Problem, pairs: MatchedMeasurements) -> dict[int,
                 "probability), as with objects at rest and echoes that come and go"
             )
     return found
+
+
+def _lasting(problem: Problem, pairs: MatchedMeasurements, apart: Sequence[int], short: Registration) -> dict[int, str]:
+    """Return the noise of sensors that share no targets, where errors last for several scans, and by how much.
+
+    Motion of the targets explains all but the part that changes from scan to scan. short: fit of short straight pieces.
+    """
+    none, period = np.zeros(short.biases.shape, bool), _MANY_SCANS / SCANS_A_PIECE * _period(problem)
+    ratios = register(pairs, problem.sites, none, np.ones(none.shape), _NEARER * short.stds, period).stds / short.stds
+    held = dict[int, str]()
+    for i, each in enumerate(problem.parameters):
+        ratio = ratios[each.sensor, : len(fitted(problem.sites[each.sensor].kind))].max()
+        if each.kind == "noise" and each.sensor in apart and ratio > _LASTING:
+            held[i] = (
+                f"errors about straight lines through {_MANY_SCANS} scans are {ratio:.1f} times those through "
+                f"{SCANS_A_PIECE}, and one sensor cannot separate errors that last from turns of the targets"
+            )
+    return held
 
 
 def dispersion(pairs: MatchedMeasurements, s: int) -> float:

@@ -2,7 +2,7 @@
 
 Steps are Newton's. The curvature along each parameter is that of central differences; correlations of parameters are
 those of the terms' scores (Berndt, Hall, Hall, Hausman 1974). Steps that continue near the maximum use one-sided
-differences with the curvature known, at half the cost.
+differences with the curvature known, at half the cost; a short last step needs none.
 """
 
 from __future__ import annotations
@@ -19,13 +19,14 @@ from vedette.kernels.base.types import Bools, Floats, Ints
 Terms = Callable[[Floats], Floats]  # terms of the log likelihood as a function of all parameters on their scales
 _ENOUGH = 0.4  # convergence: largest further step, in standard errors
 _JUMPS = 0.6  # the same where no share of it raises the sum, as the terms may jump
-_NEAR = 4.0  # the same, below which the curvature is not computed again
-_RAISED = 1.0  # log likelihood that twice a step must gain
+_LEFT = 0.5  # largest share of a whole step that is left after it if the curvature is right to a factor of 2
+_FAR = 3.0  # twice the expected change of the sum by a step, per parameter, above which the curvature is computed again
+_KEPT = 0.5  # share of the expected gain below which a step shows that its derivatives were too inexact
 _MOST_STEPS = 12
 _SHARES = (1.0, 0.5, 0.25, 0.1)  # fractions of a step to try
 _TELLING = 4.0  # eigenvalue of the information, in units of `unknown`, above which a direction is determined
 _WEAK = 25.0  # eigenvalue below which the curvature along a direction is computed
-_CORRELATED = 0.3  # correlation above which second derivatives of a pair are computed
+_CORRELATED = 0.7  # the same for parameters in units of their conditional deviations: correlations of 0.3 and more
 _REFINEMENTS = 3
 _ALIKE = 1.5  # largest ratio of the curvature over a step and the curvature that chose the step
 
@@ -33,16 +34,15 @@ _ALIKE = 1.5  # largest ratio of the curvature over a step and the curvature tha
 class Maximum(NamedTuple):
     """Maximum over p parameters on their scales.
 
-    at: (p,) parameters. terms: (num_terms,) there. scores: (num_terms, p) their derivatives. information: (p, p) minus
-    the second derivatives of the sum. stds: (p,) standard deviations if correlations are by second derivatives.
-    converged: whether a further step promises next to nothing.
+    at: (p,) parameters. terms: (num_terms,) there. scores: (num_terms, p) their derivatives, of where a short last step
+    began. information: (p, p) minus the second derivatives of the sum. converged: whether a further step promises next
+    to nothing.
     """
 
     at: Floats
     terms: Floats
     scores: Floats
     information: Floats
-    stds: Floats
     converged: bool
 
     @property
@@ -74,18 +74,14 @@ class _Search:
         up = np.stack([self.terms(self.at + way) for way in np.diag(self.steps)], axis=1)
         return np.asarray((up - self.values[:, None]) / self.steps + 0.5 * self.steps * self.bends)
 
-    def advance(self, way: Floats) -> bool:
-        """Move by the first share of a step that raises the sum, and further if the whole does; False if none does."""
+    def advance(self, way: Floats) -> float:
+        """Move by the first share of a step that raises the sum, and return it; 0 if none does."""
         for share in _SHARES:
             found = self.terms(self.at + share * way)
             if found.sum() > self.values.sum():
-                break
-        else:
-            return False
-        while share >= 1.0 and (further := self.terms(self.at + 2.0 * share * way)).sum() > found.sum() + _RAISED:
-            share, found = 2.0 * share, further
-        self.at, self.values = self.at + share * way, found
-        return True
+                self.at, self.values = self.at + share * way, found
+                return share
+        return 0.0
 
 
 def maximise(
@@ -109,9 +105,8 @@ def maximise(
     """
     steps = 0.1 * unknown if stds is None else np.minimum(stds, unknown)
     search = _Search(terms, start, terms(start), steps, np.zeros(0))
-    prior, size, converged = np.diag(unknown**-2.0), np.inf, False
+    prior, far, converged = np.diag(unknown**-2.0), True, False
     for _ in range(_MOST_STEPS):
-        far = size > _NEAR
         scores = search.central() if far else search.one_sided()
         if far:
             information = _information(scores, search.bends, unknown, groups)
@@ -125,14 +120,20 @@ def maximise(
         size = float(np.abs(way / errors).max())
         if converged := size < _ENOUGH:
             break
-        if not search.advance(way):
-            if far or size < _JUMPS:
-                converged = size < _JUMPS
-                break
-            size = np.inf  # one-sided differences may be too inexact
-    refined = _refined(terms, search.at, search.values.sum(), information, unknown)
-    wide = _stds_by_differences(terms, search.at, information, bounded, unknown)
-    return Maximum(search.at, search.values, scores, refined, wide, converged)
+        before, length = float(search.values.sum()), float(way @ information @ way)
+        share = search.advance(way)
+        if not share and (far or size < _JUMPS):
+            converged = size < _JUMPS
+            break
+        promised = share * float(way @ scores.sum(axis=0)) - 0.5 * share**2 * length
+        gained, far = float(search.values.sum()) - before, share**2 * length > _FAR * len(way)
+        # One-sided differences, or a curvature from far away, may be too inexact.
+        far = far or not _KEPT * promised < gained < promised / _KEPT + _JUMPS
+        if converged := not far and share == 1.0 and size < _ENOUGH / _LEFT:
+            break
+    for scale, weak in ((unknown, _WEAK), (1.0 / np.sqrt(np.diag(information)), _CORRELATED)):
+        information = _refined(terms, search.at, float(search.values.sum()), information, unknown, scale, weak)
+    return Maximum(search.at, search.values, scores, information, converged)
 
 
 def _information(scores: Floats, bends: Floats, unknown: Floats, groups: Sequence[Sequence[int]]) -> Floats:
@@ -145,21 +146,6 @@ def _information(scores: Floats, bends: Floats, unknown: Floats, groups: Sequenc
         same[np.ix_(group, group)] = True
     scale = np.sqrt(sizes / np.diag(products))
     return np.asarray(np.where(same, products, 0.0) * np.outer(scale, scale))
-
-
-def _stds_by_differences(terms: Terms, at: Floats, information: Floats, cov: Floats, unknown: Floats) -> Floats:
-    """(p,) standard deviations if entries of correlated parameters are differences over two conditional deviations.
-
-    Scores do not show these correlations well, above all those of a clock: the sum jumps where the order of scans
-    changes. cov: (p, p) covariance by the scores.
-    """
-    steps, found = np.diag(2.0 / np.sqrt(np.diag(information))), information.copy()
-    correlations = np.tril(cov / np.sqrt(np.outer(np.diag(cov), np.diag(cov))), -1)
-    for i, j in np.argwhere(np.abs(correlations) > _CORRELATED).tolist():
-        sides = [a * b * float(terms(at + a * steps[i] + b * steps[j]).sum()) for a in (1.0, -1.0) for b in (1.0, -1.0)]
-        found[i, j] = found[j, i] = -sum(sides) / (4.0 * steps[i, i] * steps[j, j])
-    values, vectors = _spectrum(found, unknown)
-    return np.asarray(unknown * np.sqrt((vectors**2 / np.maximum(values, 1.0)).sum(axis=1)))
 
 
 def block_scores(scores: Floats, blocks: Ints) -> Floats:
@@ -210,26 +196,32 @@ def conditional_maximum(maximum: Maximum, unknown: Floats, held: Sequence[bool],
     return at
 
 
-def _spectrum(information: Floats, unknown: Floats) -> tuple[Floats, Floats]:
-    """Return eigenvalues and eigenvectors of the information for parameters in units of `unknown`."""
-    scaled = information * np.outer(unknown, unknown)
+def _spectrum(information: Floats, scale: Floats) -> tuple[Floats, Floats]:
+    """Return eigenvalues and eigenvectors of the information for parameters in units of `scale`."""
+    scaled = information * np.outer(scale, scale)
     values, vectors = np.linalg.eigh(0.5 * (scaled + scaled.T))
     return values, vectors
 
 
-def _refined(terms: Terms, at: Floats, highest: float, information: Floats, unknown: Floats) -> Floats:
+def _refined(
+    terms: Terms, at: Floats, highest: float, information: Floats, unknown: Floats, scale: Floats, weak: float
+) -> Floats:
     """(p, p) information, each small eigenvalue by differences over the standard deviation of its direction.
 
     The information about a poorly determined combination of parameters is small compared with that about each
-    parameter, and differences over steps in single parameters lose it in their errors.
+    parameter. Differences over steps in single parameters lose it in their errors, and scores do not show it well.
+
+    scale: (p,) units of the parameters. weak: eigenvalue below which a direction is refined.
     """
-    values, vectors = _spectrum(information, unknown)
-    for i in np.flatnonzero(values < _WEAK).tolist():
+    values, vectors = _spectrum(information, scale)
+    for i in np.flatnonzero(values < weak).tolist():
+        way = scale * vectors[:, i]
+        least = float(((way / unknown) ** 2).sum())  # no farther than the prior
         for _ in range(_REFINEMENTS):
-            chosen = max(values[i], 1.0)
-            way = unknown * vectors[:, i] / np.sqrt(chosen)
-            sides = float(terms(at + way).sum()) + float(terms(at - way).sum())
+            chosen = max(values[i], least)
+            step = way / np.sqrt(chosen)
+            sides = float(terms(at + step).sum()) + float(terms(at - step).sum())
             values[i] = chosen * (2.0 * highest - sides)
-            if chosen / _ALIKE < values[i] < chosen * _ALIKE or max(values[i], chosen) <= 1.0:
+            if chosen / _ALIKE < values[i] < chosen * _ALIKE or max(values[i], chosen) <= least:
                 break
-    return np.asarray((vectors * values) @ vectors.T / np.outer(unknown, unknown))
+    return np.asarray((vectors * values) @ vectors.T / np.outer(scale, scale))

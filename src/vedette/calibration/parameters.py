@@ -9,6 +9,7 @@ from typing import Literal
 
 import numpy as np
 
+from vedette.filters.inputs import births_within
 from vedette.kernels.base.types import Floats
 from vedette.recorded import RecordedScans, RecordedSensor, remove_biases
 from vedette.tracking import Tracker
@@ -89,14 +90,16 @@ class Problem:
         recording: as recorded, including biases.
         sites: the sensors, with their biases except those that are parameters.
         parameters: the parameters to estimate.
-        tracker: function of the parameter values; returns a deterministic tracker for such sensors, and (num_sensors,)
-            what to add to its log likelihood per scan.
+        tracker: function of the parameter values and `births`; returns a deterministic tracker for such sensors, and
+            (num_sensors,) what to add to its log likelihood per scan.
+        births: expected births from measurements per scan, where their rate is learnt.
     """
 
     recording: RecordedScans
     sites: tuple[RecordedSensor, ...]
     parameters: tuple[Parameter, ...]
-    tracker: Callable[[Floats], tuple[Tracker, Floats]]
+    tracker: Callable[[Floats, float], tuple[Tracker, Floats]]
+    births: float
 
     def values(self, free: Floats) -> Floats:
         """(num_parameters,) values of numbers on the parameters' scales."""
@@ -126,13 +129,11 @@ class Problem:
         those before, as reported by the tracker's filter.
         """
         values = self.values(free)
-        recording, (tracker, more) = self.without_biases(values), self.tracker(values)
+        recording, (tracker, more) = self.without_biases(values), self.tracker(values, self.births)
         rngs = (np.random.default_rng(0),) * len(self.sites)
         counts = [sum(scans[s] is not None for scans in self.recording.scans) for s in range(len(self.sites))]
         places = np.concatenate([[0], np.cumsum(counts)])
         found, state = np.zeros(places[-1]), tracker.initial()
-        birth = tracker.targets.birth
-        at_once = birth.from_measurements is not None and birth.num_sites == 0 and birth.period is None
         gaps = np.diff(recording.times, append=recording.times[-1]).tolist()
         instants = zip(recording.times.tolist(), gaps, recording.scans, recording.poses, strict=True)
         for time, gap, scans, poses in instants:
@@ -140,7 +141,7 @@ class Problem:
             scanning = [s for s, scan in enumerate(scans) if scan is not None]
             found[places[scanning[0]]] = sum(each.log_likelihood for each in info.filters) + more[scanning].sum()
             places[scanning] += 1
-            if at_once and gap > _AT_ONCE:
+            if gap > _AT_ONCE and state.memory is not None:
                 # The birth positions must not depend on the time of the next scan of another sensor.
-                state, _ = tracker.step(state, [None] * len(scans), poses, math.nextafter(time, math.inf), rngs=rngs)
+                state = replace(state, fused=births_within(state.fused, None, 0.0, state.memory), memory=None)
         return found

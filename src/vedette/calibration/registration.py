@@ -29,7 +29,7 @@ _SURE = 0.5  # existence probability above which a track is matched with measure
 _GATE = 4.0  # standard deviations
 _HUBER = 1.5
 _ROUNDS = 10
-_SCANS_A_PIECE = 5  # scans of the slowest sensor per piece
+SCANS_A_PIECE = 5  # scans of the slowest sensor per piece
 _LEAST_PAIRS = 4  # least number of pairs in a piece
 _LEAST_SEEN = 3  # least number of measurements of a target for a sensor to share it with others
 _MAD = 1.4826  # standard deviation of Gaussian numbers over their median absolute value
@@ -230,7 +230,7 @@ def register(
         period: of the slowest sensor, s.
     """
     biases = np.zeros(asked.shape)
-    pieces, middles, states = _pieces(pairs, _SCANS_A_PIECE * period)
+    pieces, middles, states = _pieces(pairs, SCANS_A_PIECE * period)
     for _ in range(_ROUNDS):
         residuals, own, of_bias = _linearised(pairs, sites, biases, pieces, middles, states)
         spreads = _spreads(residuals, pairs.sensors, pieces, stds)[pairs.sensors]

@@ -120,14 +120,15 @@ def _longest(scans: list[_UnexplainedScan], free: list[Bools], slowest: float) -
             usable = (speeds >= slowest) & (speeds <= _MAX_SPEED) & free[k - 1][:, None] & free[k][None]
             for i, j in zip(*(each.tolist() for each in np.nonzero(usable)), strict=True):
                 continued[i, j] = [(k - 1, i), (k, j)]
-            for (h, i), course in courses.items():
-                ratio = step / (previous.time - scans[k - 2].time)
-                predicted = previous.places[i] + ratio * (previous.places[i] - scans[k - 2].places[h])
-                distances = np.hypot(*(current.places - predicted).T)
-                gates = _GATE * current.stds * math.sqrt(1.0 + (1.0 + ratio) ** 2 + ratio**2)
-                for j in np.flatnonzero((distances <= gates) & usable[i]).tolist():
-                    if len(course) >= len(continued[i, j]):
-                        continued[i, j] = [*course, (k, j)]
+            ends, before = np.array(list(courses), np.int64).reshape(-1, 2), list(courses.values())
+            ratio = step / (previous.time - scans[k - 2].time) if before else 0.0
+            last = previous.places[ends[:, 1]]
+            gaps = current.places[None] - (last + ratio * (last - scans[k - 2].places[ends[:, 0]]))[:, None]
+            gates = _GATE * current.stds * math.sqrt(1.0 + (1.0 + ratio) ** 2 + ratio**2)
+            near = (np.hypot(gaps[..., 0], gaps[..., 1]) <= gates) & usable[ends[:, 1]]
+            for c, j in np.argwhere(near).tolist():
+                if len(before[c]) >= len(continued[i := int(ends[c, 1]), j]):
+                    continued[i, j] = [*before[c], (k, j)]
         courses = continued
         best = max([best, *courses.values()], key=len)
     return best

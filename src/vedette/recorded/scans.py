@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from vedette.errors import InputError
-from vedette.internal.quantities import COMPONENTS, PLACED
+from vedette.internal.quantities import COMPONENTS, PLACED, is_position
 from vedette.internal.text import pluralise, shown
 from vedette.kernels.base.types import Floats
 from vedette.models.bias import NO_BIAS
@@ -75,14 +75,12 @@ def _without_wild(
         return rows, (), ()
     placed_rows = [rows[i] for i in placed]
     sensor_places = np.array([row.pose[:2] for row in placed_rows])
-    places = np.concatenate(
-        [
-            places_of(_scan([row], sites[row.sensor]), np.array(row.pose[:2]), sites[row.sensor].kind)
-            for row in placed_rows
-        ]
-    )
     reaches = np.array([sites[row.sensor].reach for row in placed_rows])
     times, sensors = np.array([row.time for row in placed_rows]), np.array([row.sensor for row in placed_rows])
+    places = np.where([[is_position(sites[s].kind)] for s in sensors.tolist()], 0.0, sensor_places)
+    for s in set(sensors.tolist()):
+        scan = _scan([row for row in placed_rows if row.sensor == s], sites[s])
+        places[sensors == s] += places_of(scan, np.zeros(2), sites[s].kind)
     is_wild = wild(times, places, sensor_places, reaches)
     texts, emptied = list[str](), dict[int, Row]()
     for j in np.flatnonzero(is_wild).tolist():

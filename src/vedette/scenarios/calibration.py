@@ -92,12 +92,12 @@ def build_problem(
                 parameters += _bias_parameters(s, sensor, sites[s].bias, clockwise, position, only_positions, usual)
             parameters += _model_parameters(s, sensor, prior_scale)
     filters = [sensor.filter for sensor in build_sensors(scenario)]
-    targets = _births_per_scan(common_target_model(filters), recording.times)
     region, method = model.region.build(), model.filter.gaussian_method
 
     wide_region = _widen_region(region)
 
-    def tracker(values: Floats) -> tuple[Tracker, Floats]:
+    def tracker(values: Floats, births: float) -> tuple[Tracker, Floats]:
+        targets = _births_per_scan(common_target_model(filters), recording.times, births)
         models, added_rates = list[SensorModel](), np.zeros(len(model.sensors))
         biased = with_biases(sites, parameters, values)
         with suppress_unit_warnings():
@@ -115,7 +115,7 @@ def build_problem(
                 models.append(built)
         return Central(SequentialLmbFilter(targets, tuple(models), _LIMITS)), added_rates
 
-    return Problem(recording, sites, tuple(parameters), tracker)
+    return Problem(recording, sites, tuple(parameters), tracker, EXPECTED_BIRTHS)
 
 
 def _smooth(method: GaussianMethod, kind: str) -> GaussianMethod:
@@ -127,18 +127,18 @@ def _smooth(method: GaussianMethod, kind: str) -> GaussianMethod:
     return "ukf" if method == "auto" and kind in PLACED and kind not in HEIGHT_DEPENDENT else method
 
 
-def _births_per_scan(targets: TargetModel, times: Floats) -> TargetModel:
+def _births_per_scan(targets: TargetModel, times: Floats, learnt: float) -> TargetModel:
     """Return the targets with the expected births of an average scan interval at every scan, whenever it comes.
 
-    A learnt number is replaced by `EXPECTED_BIRTHS`. Births that count per period become more the later a scan comes,
-    which would make later clocks more likely.
+    learnt: replaces a number that is to be learnt, and would change with the parameters. Births that count per period
+    become more the later a scan comes, which would make later clocks more likely.
     """
     birth = targets.birth
     measured = birth.from_measurements
     if measured is None:
         return targets
-    if isinstance(measured.expected, str):  # a rate that is learnt would change with the parameters
-        measured = replace(measured, expected=EXPECTED_BIRTHS)
+    if isinstance(measured.expected, str):
+        measured = replace(measured, expected=learnt)
     elif birth.period is None or len(times) < 2:
         return targets
     else:
