@@ -48,6 +48,9 @@ FAULTS = {
     "a target 8 times as fast or more": "fast targets",
     "four returns a target": "several returns",
     "six stationary echoes, seen in half of the scans": "stationary echoes",
+    "detections lost beyond the median range": "detection by place",
+    "detections lost in the first third of bearings": "detection by place",
+    "clutter in a sector of 40 deg": "clutter by place",
     "no scan for a quarter of the time": "period",
     "first scan after a third of the time": "period",
     "each second scan only, from the middle on": "period",
@@ -176,6 +179,12 @@ def changed(rows: list[Row], fault: str, noise: float, targets: Floats, rng: np.
     first = [row for row in rows if row["sensor"] == "sensor 1"]
     places = np.array([place_of(row) for row in first if is_measured(row)])
     echoes = rng.uniform(places.min(axis=0), places.max(axis=0), (6, 2))
+    offsets = targets - own_place(first[0])
+    middle, far = float(np.median(np.hypot(*offsets.T))), float(np.hypot(*(places - own_place(first[0])).T).max())
+    centre = np.arctan2(*offsets.mean(axis=0)[::-1])
+    turns = np.remainder(np.arctan2(offsets[:, 1], offsets[:, 0]) - centre + math.pi, 2.0 * math.pi) - math.pi
+    # The first third of the targets' bearings; and the middle of a sector with clutter.
+    limit, angle = float(np.quantile(turns, 1.0 / 3.0)), math.atan2(*offsets[rng.integers(len(offsets))][::-1])
     for k, time in enumerate(times):
         for row in (row for row in rows if row["time"] == time):
             if row["sensor"] != "sensor 1" or not is_measured(row):
@@ -183,6 +192,12 @@ def changed(rows: list[Row], fault: str, noise: float, targets: Floats, rng: np.
                     yield row
                 continue
             if is_out(fault, k):
+                continue
+            away = place_of(row) - own_place(row)
+            turn = math.remainder(math.atan2(away[1], away[0]) - centre, 2.0 * math.pi)
+            is_there = np.hypot(*away) > middle if "beyond" in fault else "lost in" in fault and turn < limit
+            if is_there and rng.random() < 0.6:
+                yield empty(row)
                 continue
             yield row
             if "returns" in fault and np.hypot(*(targets - place_of(row)).T).min() < 4.0 * noise:
@@ -196,6 +211,10 @@ def changed(rows: list[Row], fault: str, noise: float, targets: Floats, rng: np.
         if "echoes" in fault:
             for echo in echoes[rng.random(len(echoes)) < 0.5]:
                 yield at_place(pattern, echo + rng.normal(0.0, 0.5 * noise, 2))
+        if "clutter in" in fault:
+            for _ in range(rng.poisson(max(2.0, 1.5 * len(places) / len(times)))):
+                direction, reach = angle + rng.uniform(-0.35, 0.35), far * math.sqrt(rng.random())
+                yield at_place(pattern, own_place(pattern) + reach * np.array([np.cos(direction), np.sin(direction)]))
 
 
 def is_out(fault: str, k: int) -> bool:
@@ -209,6 +228,11 @@ def is_out(fault: str, k: int) -> bool:
 def is_measured(row: Row) -> bool:
     """Return True for a row with a measurement, False for that of an empty scan."""
     return any(row.get(name) is not None for name in ("range_m", "x_m"))
+
+
+def empty(row: Row) -> Row:
+    """Return the row of an empty scan."""
+    return {**row, **{name: None for name in ("bearing_rad", "range_m", "x_m", "y_m") if name in row}}
 
 
 def own_place(row: Row) -> Floats:

@@ -34,6 +34,13 @@ class BlockMean(NamedTuple):
         scale = (8.0 * self.freedom + 1.0) / (8.0 * self.freedom + 3.0)
         return scale * math.sqrt(self.freedom * math.log1p(ratio**2 / self.freedom))
 
+    def minus(self, other: BlockMean) -> BlockMean:
+        """Return the difference to the mean of other blocks, which vary alike; it counts with the fewer blocks."""
+        both, freedom = (self, other), self.freedom + other.freedom
+        variance = sum(each.freedom * max(each.num, 1) * each.error**2 for each in both) / freedom
+        error = math.sqrt(variance * sum(1.0 / max(each.num, 1) for each in both))
+        return BlockMean(self.value - other.value, error, min(self.num, other.num), freedom)
+
     def is_surely(self, value: float, least: float) -> bool:
         """Return True if the mean surely differs from a value, and by more than `least`."""
         return abs(self.value - value) > least and self.away_from(value) > SURE

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from vedette.evaluation.block_means import BLOCK, SURE, blocks, mean_of
+from vedette.evaluation.fit_by_place import LEAST_EXCESS, clutter_by_place, detection_by_place
 from vedette.evaluation.innovations import Assumed, Compared, Instant, Matches, SensorFit, compared, joined
 from vedette.evaluation.scan_periods import period_findings
 from vedette.evaluation.scans import rows_of_record
@@ -25,13 +26,15 @@ from vedette.scenarios.sections.recording import recorded_sensors, returns_model
 from vedette.simulation.records import RunRecord
 
 NOTHING = "nothing, as no track spans two scans"
-_TESTS = "bias, noise, motion, detection, several returns, clutter, periods, agreement of sensors, fast targets"
+_TESTS = (
+    "bias, noise, motion, detection and clutter, both also by place, several returns, periods, agreement of sensors, "
+    "fast targets"
+)
 _MOST_SCANS, _STRETCH = 5000, 100  # that are looked at, in stretches of successive ones
 _LEAST_BIAS = 0.25  # of the noise's standard deviation; smaller ones cost no accuracy
 _SPREADS = (0.6, 1.5)  # of the assumed standard deviation; no finding within them
 _LEAST_DIFFERENCE = 0.1  # of the share of detected targets
 _RETURNS = 0.5  # further measurements of a target in a scan; two targets that cross slowly have some, too
-_LEAST_EXCESS = 0.5  # unexplained measurements a scan above the clutter rate; and as a share of it
 _MANY_PLACES = 5  # stationary places; fewer may be targets at rest
 _EDGE = 3  # matches at each end of a track, which depend on what was detected
 
@@ -132,11 +135,15 @@ def _stationary_findings(scenario: Scenario) -> Iterator[Finding]:
 
 def _of_sensor(fit: SensorFit, s: int, assumed: Assumed) -> Iterator[tuple[str, str]]:
     """Yield the findings of a sensor as test and text."""
-    tracks, model = fit.matches.by_label(), assumed.sensors[s]
+    tracks, model, compass = fit.matches.by_label(), assumed.sensors[s], assumed.scenario.model.by_compass
     if components := model.measurement.components:
         yield from _innovation_findings(fit, tracks, components, len(assumed.sensors))
-    yield from _detection_finding(fit.matches, tracks)
-    yield from _count_findings(fit, model.clutter.rate)
+    yield from _detection_finding(fit.matches, tracks, compass)
+    yield from _returns_finding(fit)
+    if (text := clutter_by_place(fit, model, assumed.motion.state_dim, compass)) is not None:
+        yield "clutter by place", text
+    else:
+        yield from _clutter_finding(fit, model.clutter.rate)
 
 
 def _innovation_findings(
@@ -174,13 +181,18 @@ def _innovation_findings(
             )
 
 
-def _detection_finding(matches: Matches, tracks: Sequence[Ints]) -> Iterator[tuple[str, str]]:
-    """Yield a finding of the probability of detection."""
+def _detection_finding(matches: Matches, tracks: Sequence[Ints], compass: bool) -> Iterator[tuple[str, str]]:
+    """Yield a finding of the probability of detection, or of the place where it differs."""
     inner = [track[_EDGE:-_EDGE] for track in tracks if len(track) > 4 * _EDGE]
-    likely = 1.0 - (1.0 - matches.probabilities) * np.exp(-matches.by_chance)
-    excess = mean_of(blocks([(matches.numbers > 0)[track] - likely[track] for track in inner]))
-    if excess.is_surely(0.0, _LEAST_DIFFERENCE):
-        assumed = mean_of(blocks([likely[track] for track in inner])).value
+    chances = 1.0 - (1.0 - matches.probabilities) * np.exp(-matches.by_chance)
+    columns = chances, 1.0 * (matches.numbers > 0), *matches.offsets.T
+    likely, made, *offsets = (blocks([column[track] for track in inner]) for column in columns)
+    excess = mean_of(np.column_stack([made[:, 0] - likely[:, 0], made[:, 1]]))
+    means = np.column_stack([each[:, 0] / each[:, 1] for each in offsets])
+    if (text := detection_by_place(means, made, likely, compass)) is not None:
+        yield "detection by place", text
+    elif excess.is_surely(0.0, _LEAST_DIFFERENCE):
+        assumed = mean_of(likely).value
         yield (
             "detection",
             f"detects its tracks in {assumed + excess.value:.0%} of scans where {assumed:.0%} is assumed: `vedette "
@@ -188,8 +200,8 @@ def _detection_finding(matches: Matches, tracks: Sequence[Ints]) -> Iterator[tup
         )
 
 
-def _count_findings(fit: SensorFit, rate: float) -> Iterator[tuple[str, str]]:
-    """Yield findings of several measurements of a target, which may have several tracks, and of those at no track."""
+def _returns_finding(fit: SensorFit) -> Iterator[tuple[str, str]]:
+    """Yield a finding of several measurements of a target, which may have several tracks."""
     further = mean_of(np.add.reduceat(fit.further, np.arange(0, len(fit.further), BLOCK), axis=0))
     if further.value > 0.0 and further.is_surely(0.0, _RETURNS):
         yield (
@@ -197,9 +209,13 @@ def _count_findings(fit: SensorFit, rate: float) -> Iterator[tuple[str, str]]:
             f"targets have {further.value:.1f} further measurements a scan beside them, more than clutter explains: if "
             "a target gives several returns, give the sensor its `extent` in m",
         )
+
+
+def _clutter_finding(fit: SensorFit, rate: float) -> Iterator[tuple[str, str]]:
+    """Yield a finding of the number of measurements that no track explains."""
     num_scans, found = len(fit.counts), int(fit.counts.sum())
     expected = rate * num_scans
-    least = _LEAST_EXCESS * max(expected, num_scans)
+    least = LEAST_EXCESS * max(expected, num_scans)
     if abs(found - expected) > max(least, SURE * math.sqrt(max(expected, 1.0))):
         yield (
             "clutter",

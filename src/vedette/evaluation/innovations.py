@@ -55,12 +55,14 @@ class Instant(NamedTuple):
 class Matches(NamedTuple):
     """Tracks at scans of a sensor that should contain them, with no other track near, in order of time.
 
-    labels: (num, 2). probabilities: (num,) of a detection. numbers: (num,) measurements within the gate. by_chance:
-    (num,) expected number of them that are clutter. innovations: (num, meas_dim) of the only measurement inside, NaN if
-    there is not exactly one; variances: of them. noise: (num, meas_dim) variances of the noise alone.
+    labels: (num, 2). offsets: (num, 2) predicted position relative to the sensor, m. probabilities: (num,) of a
+    detection. numbers: (num,) measurements within the gate. by_chance: (num,) expected number of them that are clutter.
+    innovations: (num, meas_dim) of the only measurement inside, NaN if there is not exactly one; variances: of them.
+    noise: (num, meas_dim) variances of the noise alone.
     """
 
     labels: Ints
+    offsets: Floats
     probabilities: Floats
     numbers: Ints
     by_chance: Floats
@@ -72,7 +74,7 @@ class Matches(NamedTuple):
     def none(cls, dim: int) -> Matches:
         """Return no matches of a sensor of `dim` components."""
         flat, wide = np.empty(0), np.empty((0, dim))
-        return cls(np.empty((0, 2), np.int64), flat, flat.astype(np.int64), flat, wide, wide, wide)
+        return cls(np.empty((0, 2), np.int64), np.empty((0, 2)), flat, flat.astype(np.int64), flat, wide, wide, wide)
 
     def by_label(self) -> list[Ints]:
         """Return the indices of the matches of each track, in order of time."""
@@ -84,13 +86,14 @@ class Matches(NamedTuple):
 class SensorFit(NamedTuple):
     """Measurements of a sensor, compared with what its model expects.
 
-    counts: (num_scans,) measurements in the gate of no track, in the scans that were looked at. further: (num_scans, 2)
-    measurements in gates above one for each group of near tracks, and these groups. matches: tracks at these scans.
-    unexplained: (num, 2) positions relative to the sensor, m, of measurements in the gate of no track; NaN of sensors
-    that measure no positions.
+    counts: (num_scans,) measurements in the gate of no track, in the scans that were looked at. pose: at the last of
+    these. further: (num_scans, 2) measurements in gates above one for each group of near tracks, and these groups.
+    matches: tracks at these scans. unexplained: (num, 2) positions relative to the sensor, m, of measurements in the
+    gate of no track; NaN of sensors that measure no positions.
     """
 
     counts: Ints
+    pose: Floats
     further: Floats
     matches: Matches
     unexplained: Floats
@@ -119,9 +122,9 @@ class Compared(NamedTuple):
 
 def joined(fits: Iterable[SensorFit]) -> SensorFit:
     """Return the fit of all scans of one or more fits of a sensor."""
-    counts, further, matches, unexplained = zip(*fits, strict=True)
+    counts, poses, further, matches, unexplained = zip(*fits, strict=True)
     columns = Matches(*(np.concatenate(each) for each in zip(*matches, strict=True)))
-    return SensorFit(np.concatenate(counts), np.concatenate(further), columns, np.concatenate(unexplained))
+    return SensorFit(np.concatenate(counts), poses[-1], np.concatenate(further), columns, np.concatenate(unexplained))
 
 
 def compared(before: Instant, now: Instant, assumed: Assumed) -> Compared:
@@ -194,7 +197,7 @@ def _of_scan(
         variances[single] = np.diagonal(spreads[single, own], axis1=1, axis2=2)
         probabilities, chance = sensor.mean_detection(means, covs, pose), _by_chance(sensor, expected, spread, pose)
         noises = np.diagonal(noise, axis1=1, axis2=2)
-        columns = labels, probabilities, numbers, chance, residuals, variances, noises
+        columns = labels, means[:, :2] - pose[:2], probabilities, numbers, chance, residuals, variances, noises
         num, group = connected_components(_near(expected, spread, periods))
         matches = Matches(*(np.asarray(each)[np.bincount(group)[group] == 1] for each in columns))
         likely = np.zeros(num)
@@ -203,7 +206,7 @@ def _of_scan(
     beside = np.full((int((~explained).sum()), 2), np.nan)
     if sensor.measurement.places is not None:
         beside = sensor.measurement.positions(measured[~explained], pose) - pose[:2]
-    return SensorFit(np.array([len(beside)]), further, matches, beside), probabilities, numbers > 0
+    return SensorFit(np.array([len(beside)]), pose, further, matches, beside), probabilities, numbers > 0
 
 
 def _inside(measured: Floats, expected: Floats, spread: Floats, periods: Floats, gate: float = GATE) -> Bools:
