@@ -46,6 +46,10 @@ class VisibilityGraph:
         """Return the graph of zones, each the interior of polygons (num_corners, 2), m, by the even-odd rule."""
         from scipy.sparse.csgraph import shortest_path
 
+        none = np.empty((0, 2))
+        if not zones:
+            edges, nothing = Edges(none, none, np.empty(0, np.int64)), np.empty((0, 0))
+            return cls(edges, none, none, nothing, nothing.astype(np.int64))
         zones = [[ring[np.any(ring != np.roll(ring, 1, axis=0), axis=1)] for ring in rings] for rings in zones]
         pairs = [edges_of(rings) for rings in zones]
         starts, ends = (np.concatenate(each) for each in zip(*pairs, strict=True))
@@ -170,13 +174,13 @@ class Paths:
         return np.concatenate([begin, graph.nodes[chain[::-1]], self.points[goal][np.newaxis]])
 
 
-def visibility_graph(constraints: Sequence[Constraint]) -> VisibilityGraph | None:
-    """Return the visibility graph of the zones of constraints; None if they have none.
+def visibility_graph(constraints: Sequence[Constraint] = ()) -> VisibilityGraph:
+    """Return the visibility graph of the zones of constraints; without zones all paths are straight.
 
     The graph of the same zones is built once and shared by all decisions, planners and runs.
     """
     zones = [constraint.zone for constraint in constraints if provides(constraint, ZoneConstraint)]
-    return _built(tuple(tuple(ring.tobytes() for ring in rings) for rings in zones)) if zones else None
+    return _built(tuple(tuple(ring.tobytes() for ring in rings) for rings in zones))
 
 
 @lru_cache(maxsize=32)
@@ -192,7 +196,7 @@ def _added(first: Floats, then: Floats) -> Floats:
 
 def _inside(edges: Edges, points: Floats) -> Bools:
     """Return (num_points, num_zones) whether each point is inside each zone."""
-    inside = np.empty((len(points), int(edges.zones[-1]) + 1), np.bool_)
+    inside = np.empty((len(points), int(edges.zones.max(initial=-1)) + 1), np.bool_)
     for zone in range(inside.shape[1]):
         own = edges.zones == zone
         inside[:, zone] = inside_edges(points, (edges.starts[own], edges.ends[own]))
