@@ -23,8 +23,8 @@ from vedette.control import (
     StayInside,
     ZoneConstraint,
 )
-from vedette.control.cost_to_go import CostToGo, attracting_targets
 from vedette.control.constraints import visibility_graph
+from vedette.control.cost_to_go import CostToGo, attracting_targets
 from vedette.control.inputs import options_of
 from vedette.densities import LMB
 from vedette.filters import LmbFilter

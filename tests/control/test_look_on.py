@@ -22,8 +22,8 @@ from vedette.control import (
     MobileSensor,
     Plan,
 )
-from vedette.control.cost_to_go import CostToGo, attracting_targets
 from vedette.control.constraints import visibility_graph
+from vedette.control.cost_to_go import CostToGo, attracting_targets
 from vedette.control.evaluator import mean_over_horizons
 from vedette.control.evidence import Evidence
 from vedette.control.extrapolation import extrapolated
@@ -375,8 +375,9 @@ def test_a_near_lost_target_is_visited_first(speeds: Any, far: float, num: int) 
     covs = [np.diag([std**2 / 2.0, std**2 / 2.0, 1.0, 1.0]) for std in stds]
     states = np.concatenate([places, np.zeros_like(places)], axis=1)
     belief = LMB.from_bernoullis([(1, i) for i in range(len(places))], [0.98] * len(places), states, covs)
+    clutter = models.around_sensor(1.0, "position", radius=120.0)
     seer = models.SensorModel(
-        models.position(), models.constant_noise([4.0, 4.0]), models.limited_range(0.95, 120.0), models.around_sensor(1.0, "position", radius=120.0)
+        models.position(), models.constant_noise([4.0, 4.0]), models.limited_range(0.95, 120.0), clutter
     )
     calm = replace(CALM, motion=models.constant_velocity(0.5))
     sensor = MobileSensor(LmbFilter(calm, seer), HeadingPlatform(speeds, EIGHT))

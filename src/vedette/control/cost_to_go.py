@@ -1,8 +1,8 @@
 """The cost-to-go: the loss beyond the horizon, under a base policy that continues each course to a lost target.
 
-The loss of a course is that of the policy which begins with it (rollout: D. P. Bertsekas, Rollout, Policy Iteration, and
-Distributed Reinforcement Learning, Athena Scientific, 2020). The policy goes to one target by the shortest path around
-zones, meets it where it will be then, and follows it.
+The loss of a course is that of the policy which begins with it (D. P. Bertsekas, Rollout, Policy Iteration, and
+Distributed Reinforcement Learning, 2020). The policy goes to one target by the shortest path around zones, meets it
+where it will be then, and follows it.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from vedette.control.camera_turning import seconds_to_search, seconds_to_turn, turn_rate, views_per_second
+from vedette.control.camera_turning import seconds_to_search, seconds_to_turn, turn_rate
 from vedette.control.constraints import Paths, VisibilityGraph
 from vedette.control.extrapolation import extrapolated, write_path
 from vedette.control.settings import MobileSensor, PlanningSettings
@@ -21,7 +21,7 @@ from vedette.densities import LMB, UndetectedIntensity
 from vedette.kernels.base.types import Bools, Floats, Ints
 from vedette.models.functions import numbers_at
 from vedette.platforms import Options
-from vedette.platforms.camera import line_of_sight
+from vedette.platforms.camera import HALF_WIDTH, line_of_sight
 
 # Minimum existence probability of targets that sensors approach from beyond the horizon.
 _LEAST_EXISTENCE = 0.1
@@ -86,13 +86,20 @@ class CostToGo:
         speeds, turns = self._rates(horizon)
         if not ((speeds > 0.0) | (turns > 0.0)).all():
             return ()
-        beyond = _STAY * max(self._seconds_to_targets(speeds, turns), self._seconds_to_search(turns))
+        beyond = self._seconds_to_targets(speeds, turns)
+        if self.undetected is not None and turns.any():
+            search = seconds_to_search(self.options, turns.tolist(), self.reaches, self.undetected, _LEAST_EXISTENCE)
+            beyond = max(beyond, search)
+        beyond *= _STAY
         if len(self.places) and not all([own.scans.any(axis=1).all() for own in self.options]):
             beyond = max(beyond, horizon)
         if beyond == 0.0:
             return ()
-        views = map(views_per_second, self.options, turns.tolist())
-        rate = max(float((speeds / self.reaches).max()), *views)
+        rates = (speeds / self.reaches).tolist()
+        rates += [
+            turn / (2.0 * own.pose[HALF_WIDTH]) for own, turn in zip(self.options, turns, strict=True) if turn > 0.0
+        ]
+        rate = float(max(rates))
         total = min(horizon + beyond, max(_MOST_STEPS / rate if rate > 0.0 else math.inf, 2.0 * horizon))
         num_steps = min(max(_LEAST_STEPS, math.ceil(total * rate)), _MOST_STEPS)
         return tuple(
@@ -129,17 +136,11 @@ class CostToGo:
 
     def _rates(self, horizon: float) -> tuple[Floats, Floats]:
         """Return (num_sensors,) the speed, m/s, of each sensor's farthest course, and its largest turn rate, rad/s."""
-        speeds, turns = np.empty(len(self.options)), np.zeros(len(self.options))
-        for s, own in enumerate(self.options):
-            offsets = own.courses[:, -1, :2] - own.pose[:2]
-            speeds[s] = np.hypot(offsets[:, 0], offsets[:, 1]).max() / horizon
-            turns[s] = turn_rate(own, horizon)
-        return speeds, turns
+        speeds = [np.hypot(*(own.courses[:, -1, :2] - own.pose[:2]).T).max() / horizon for own in self.options]
+        return np.array(speeds), np.array([turn_rate(own, horizon) for own in self.options])
 
     def _seconds_to_targets(self, speeds: Floats, turns: Floats) -> float:
         """Return the time, s, until each sensor may have reached a target and each target may be reached."""
-        if len(self.places) == 0:
-            return 0.0
         seconds = np.full((len(self.options), len(self.places)), np.inf)
         for s, (own, speed, rate) in enumerate(zip(self.options, speeds.tolist(), turns.tolist(), strict=True)):
             gaps = self._gaps(s) - self.reaches[s]
@@ -148,14 +149,8 @@ class CostToGo:
             seconds[s, gaps <= 0.0] = 0.0
             if rate > 0.0:
                 seconds[s] = np.maximum(seconds[s], seconds_to_turn(own, rate, self.places))
-        longest = np.concatenate([seconds.min(axis=0), seconds.min(axis=1)])
+        longest = np.concatenate([seconds.min(axis=0), seconds.min(axis=1, initial=np.inf)])
         return float(np.where(np.isfinite(longest), longest, 0.0).max())
-
-    def _seconds_to_search(self, turns: Floats) -> float:
-        """Return the time, s, until cameras have searched for undetected targets; 0 without such cameras or targets."""
-        if self.undetected is None or not turns.any():
-            return 0.0
-        return seconds_to_search(self.options, turns.tolist(), self.reaches, self.undetected, _LEAST_EXISTENCE)
 
     def _gaps(self, s: int) -> Floats:
         """Return the distance (num_targets,) m from the best course's end to each target; straight if in range."""
@@ -220,10 +215,9 @@ class CostToGo:
             return np.full(len(ends), -1), lengths
         progress = np.where(counts, now - np.where(counts, then, 0.0), -np.inf)
         best_courses, max_progress = progress.argmax(axis=0), progress.max(axis=0)
-        longest = lengths.max()
         with np.errstate(invalid="ignore"):
             share = np.where(
-                max_progress > _LEAST_PROGRESS, progress / max_progress, 1.0 + (progress - max_progress) / longest
+                max_progress > _LEAST_PROGRESS, progress / max_progress, 1.0 + (progress - max_progress) / lengths.max()
             )
         share = np.where(counts, np.maximum(share, 0.0), 0.0)
         largest = share.max(axis=1, keepdims=True)

@@ -10,8 +10,8 @@ import numpy as np
 
 from vedette.control.additive.rewards import AdditiveRewards
 from vedette.control.additive.table import lay_out
-from vedette.control.cost_to_go import CostToGo, attracting_targets
 from vedette.control.constraints import VisibilityGraph, visibility_graph
+from vedette.control.cost_to_go import CostToGo, attracting_targets
 from vedette.control.prediction import Prediction, predicted
 from vedette.control.pseudo_posterior_rewards import PseudoPosteriorRewards, SampleRewards
 from vedette.control.rewards.base import LabelReward, PowerReward, Reward
@@ -91,18 +91,16 @@ class Evaluator:
         (`vedette.control.cost_to_go.CostToGo.horizons`). graph: of the zones that constraints forbid, for
         paths beyond the horizon; None: there are none. Raises as `JointPlanner.plan`.
         """
-        motion = sensors[0].filter.targets.motion
         first, prediction = lay_out(sensors, options, rule, settings, reward, state, rng=rng)
-        due, to_go = isinstance(reward, ExpectedLossReward) if horizons is None else len(horizons) > 0, None
-        if due:
+        rewards, notes = [first], dict[str, None]()
+        if isinstance(reward, ExpectedLossReward) and horizons != ():
             zones = graph or visibility_graph()
             to_go = CostToGo.of(sensors, options, *attracting_targets(prediction), zones, state.undetected)
-        if horizons is None:
-            horizons = () if to_go is None else to_go.horizons(settings)
-        rewards = [first]
+            horizons, notes = to_go.horizons(settings) if horizons is None else horizons, dict.fromkeys(to_go.notes())
+        horizons = horizons or ()
         for own in horizons:
-            assert to_go is not None
             with model_errors():
+                motion = sensors[0].filter.targets.motion
                 ahead = Prediction.of(state.fused, motion, own.horizon_steps, own.horizon_period)
             paths = ahead.paths.means[places_of(to_go.labels, ahead.end.tracks.labels), :, :2]
             later = to_go.continued(settings.horizon_times(), own.horizon_times(), paths)
@@ -111,7 +109,6 @@ class Evaluator:
         for each, own in zip(rewards, (settings, *horizons), strict=True):
             counts["filter_steps"] += len(each.table.labels) * each.num_samples * own.horizon_steps
         source = mean_over_horizons(rewards) if horizons else rewards[0]
-        notes = dict.fromkeys(() if to_go is None else to_go.notes())
         return cls(settings, tuple(options), prediction, source, source, counts, notes, horizons=horizons)
 
     def joint_shape(self) -> tuple[int, ...]:

@@ -7,8 +7,8 @@ from typing import Literal, TypeAlias, get_args
 
 import numpy as np
 
-from vedette.control.cost_to_go import CostToGo
 from vedette.control.constraints import Constraint, VisibilityGraph, nearest_feasible, visibility_graph
+from vedette.control.cost_to_go import CostToGo
 from vedette.control.inputs import check_control_inputs, mask_of_decision, options_of, single_mask
 from vedette.control.plan import Plan
 from vedette.control.search import first_best
