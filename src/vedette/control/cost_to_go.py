@@ -68,7 +68,7 @@ class CostToGo:
     ) -> CostToGo:
         """Return the data for these targets. graph: of the zones that constraints forbid."""
         reaches = np.array([detection_range(sensor, own.pose) for sensor, own in zip(sensors, options, strict=True)])
-        paths = tuple(graph.to(places, own.pose[:2]) for own in options)
+        paths = tuple([graph.to(places, own.pose[:2]) for own in options])
         return cls(tuple(options), reaches, labels, places, paths, undetected)
 
     def horizons(self, settings: PlanningSettings) -> tuple[PlanningSettings, ...]:
@@ -83,7 +83,8 @@ class CostToGo:
         sensor moves meanwhile.
         """
         horizon = settings.horizon_steps * settings.horizon_period
-        speeds, turns = self._rates(horizon)
+        farthest = [np.hypot(*(own.courses[:, -1, :2] - own.pose[:2]).T).max() for own in self.options]
+        speeds, turns = np.array(farthest) / horizon, np.array([turn_rate(own, horizon) for own in self.options])
         if not ((speeds > 0.0) | (turns > 0.0)).all():
             return ()
         beyond = self._seconds_to_targets(speeds, turns)
@@ -134,11 +135,6 @@ class CostToGo:
         rows = zip(self.paths, self.options, strict=True)
         return np.concatenate([paths.distances(own.pose[np.newaxis, :2]) for paths, own in rows])
 
-    def _rates(self, horizon: float) -> tuple[Floats, Floats]:
-        """Return (num_sensors,) the speed, m/s, of each sensor's farthest course, and its largest turn rate, rad/s."""
-        speeds = [np.hypot(*(own.courses[:, -1, :2] - own.pose[:2]).T).max() / horizon for own in self.options]
-        return np.array(speeds), np.array([turn_rate(own, horizon) for own in self.options])
-
     def _seconds_to_targets(self, speeds: Floats, turns: Floats) -> float:
         """Return the time, s, until each sensor may have reached a target and each target may be reached."""
         seconds = np.full((len(self.options), len(self.places)), np.inf)
@@ -157,6 +153,8 @@ class CostToGo:
         own = self.options[s]
         ends = np.ascontiguousarray(own.courses[:, -1, :2])
         straight = np.hypot(*(ends[:, np.newaxis] - self.places).transpose(2, 0, 1))
+        if len(self.paths[s].graph.edges.zones) == 0:
+            return np.asarray(straight.min(axis=0))
         barred = self.paths[s].graph.is_blocked(own.pose[:2], own.courses[:, :, :2])
         allowed = np.ones_like(barred) if barred.all() else ~barred
         around = np.where(self._is_attainable(s), self.paths[s].distances(ends), np.inf)

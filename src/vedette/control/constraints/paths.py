@@ -69,7 +69,10 @@ class VisibilityGraph:
 
         A goal inside a zone, or one that no path reaches, is approached as closely as paths from the start allow.
         """
-        points, origin = np.array(goals, np.float64, order="C"), self.outside(start[np.newaxis])
+        points, none = np.array(goals, np.float64, order="C"), np.empty((0, len(goals)))
+        if len(self.edges.zones) == 0:
+            return Paths(self, points, np.zeros(len(points)), none, none.astype(np.int64))
+        origin = self.outside(start[np.newaxis])
         from_origin = _added(clear_lengths(origin, self.nodes, self.edges), self.lengths)[0]
         for goal in np.flatnonzero(~self._are_linked(points, origin, from_origin)).tolist():
             near = (own for own in self._nearest(points[goal]) if self._are_linked(own, origin, from_origin)[0])
@@ -78,7 +81,7 @@ class VisibilityGraph:
         through = self.lengths[:, np.newaxis] + last
         distances = np.hypot(*(goals - points).T)
         if len(self.nodes) == 0:
-            return Paths(self, points, distances, np.empty((0, len(points))), np.empty((0, len(points)), np.int64))
+            return Paths(self, points, distances, none, none.astype(np.int64))
         return Paths(self, points, distances, through.min(axis=2), through.argmin(axis=2))
 
     def is_blocked(self, start: Floats, courses: Floats) -> Bools:
@@ -205,6 +208,8 @@ def _inside(edges: Edges, points: Floats) -> Bools:
 
 def _is_free(edges: Edges, points: Floats) -> Bools:
     """Return (num_points,) whether each point is in no zone and on no edge."""
+    if len(edges.zones) == 0:
+        return np.ones(len(points), np.bool_)
     inside = _inside(edges, points)
     return ~inside.any(axis=1) & np.isinf(first_touches(points, points, edges, np.zeros_like(inside)))
 
