@@ -16,6 +16,7 @@ from __future__ import annotations
 import argparse
 import json
 import time
+from collections.abc import Callable
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -81,9 +82,8 @@ def scenario_of(scene: str, run: int) -> Scenario:
     return replace_fields(load_scenario("beyond-the-gap"), fields)
 
 
-def measured(scene: str, planner: str, run: int) -> tuple[float, float]:
+def measured(scenario: Scenario, planner: str, run: int) -> tuple[float, float]:
     """Mean OSPA, m, and CPU seconds of one run."""
-    scenario = scenario_of(scene, run)
     experiment, ospa = build_experiment(scenario), scenario.model.ospa
     score = partial(ospa_of_run, cutoff=ospa.cutoff, order=ospa.order, components=ospa.components)
     began = time.process_time()
@@ -104,11 +104,13 @@ def kept(file: Path | None) -> dict[Key, tuple[float, float]]:
     return {(row["scene"], row["planner"], row["run"]): (row["ospa"], row["seconds"]) for row in rows}
 
 
-def main() -> None:
-    """Run, and print the table."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("scenes", nargs="*", default=list(SCENES), help="of: " + ", ".join(SCENES))
-    parser.add_argument("--planners", nargs="+", default=["jdm"])
+def main(
+    description: str | None, scenes: list[str], scene_of: Callable[[str, int], Scenario], usual: list[str]
+) -> None:
+    """Run, and print the table. usual: planners unless others are named."""
+    parser = argparse.ArgumentParser(description=description, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("scenes", nargs="*", default=scenes, help="of: " + ", ".join(scenes))
+    parser.add_argument("--planners", nargs="+", default=usual)
     parser.add_argument("--runs", type=int, default=10)
     parser.add_argument("--out", type=Path)
     parser.add_argument("--against", type=Path)
@@ -121,7 +123,7 @@ def main() -> None:
             for key in keys:
                 if key in found:
                     continue
-                found[key] = measured(*key)
+                found[key] = measured(scene_of(scene, key[2]), planner, key[2])
                 if given.out is not None:
                     row = dict(zip(("scene", "planner", "run", "ospa", "seconds"), (*key, *found[key]), strict=True))
                     with given.out.open("a", encoding="utf-8") as file:
@@ -133,4 +135,4 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    main()
+    main(__doc__, list(SCENES), scenario_of, ["jdm"])

@@ -23,8 +23,8 @@ from vedette.control import (
     StayInside,
     ZoneConstraint,
 )
-from vedette.control.beyond_horizon import BeyondHorizon, attracting_targets
 from vedette.control.constraints import visibility_graph
+from vedette.control.cost_to_go import CostToGo, attracting_targets
 from vedette.control.inputs import options_of
 from vedette.densities import LMB
 from vedette.filters import LmbFilter
@@ -158,13 +158,11 @@ def test_continued_courses_stay_outside(scene: str) -> None:
         searchers(1, HeadingPlatform(STEP, tuple(np.arange(-180.0, 180.0, 15.0)))),
         visibility_graph(constraints),
     )
-    assert graph is not None
     pose = np.array([*graph.outside(np.array([start]))[0], 0.0])
     options = options_of(sensors, pose[np.newaxis], ONCE)
     times = np.arange(1.0, 40.0)
-    [later] = BeyondHorizon.of(sensors, options, *attracting_targets(belief), graph, None).extrapolated(
-        ONCE.horizon_times(), times
-    )
+    to_go = CostToGo.of(sensors, options, *attracting_targets(belief), graph, None)
+    [later] = to_go.continued(ONCE.horizon_times(), times, np.full((1, len(times), 2), goal))
     allowed = ~graph.is_blocked(pose[:2], options[0].courses[:, :, :2])
     distances = graph.to(np.array([goal]), pose[:2]).distances
     ends = [options[0].courses[c, -1, :2] for c in np.flatnonzero(allowed)]
@@ -188,8 +186,8 @@ def test_sensors_without_courses_have_none_beyond() -> None:
     sensors = searchers(2)
     first, second = options_of(sensors, poses, ONCE)
     options = first, second._replace(courses=second.courses[:0])
-    beyond = BeyondHorizon.of(sensors, options, *attracting_targets(targets([85.0, 10.0])), graph, None)
-    found = beyond.extrapolated(ONCE.horizon_times(), np.arange(1.0, 9.0))
+    to_go = CostToGo.of(sensors, options, *attracting_targets(targets([85.0, 10.0])), graph, None)
+    found = to_go.continued(ONCE.horizon_times(), np.arange(1.0, 9.0), np.full((1, 8, 2), [85.0, 10.0]))
     assert [own.courses.shape for own in found] == [(9, 8, 3), (0, 8, 3)]
 
 
@@ -222,7 +220,6 @@ def test_land_in_degrees_is_gone_around_in_metres() -> None:
     changes = {"origin": {"lon": -1.1, "lat": 50.78}, "control.constraints": [{"kind": "keep_out", "polygon": ring}]}
     planner: Any = build_planner(replace_fields(load_scenario("beyond-the-gap"), changes), "jdm", 1)
     graph = visibility_graph(planner.constraints)
-    assert graph is not None
     east, south, north = 0.02 * 70_500.0, -0.01 * 111_200.0, 0.02 * 111_200.0
     start, goal = np.array([-100.0, -200.0]), np.array([east + 100.0, -200.0])
     corners = np.array([start, (0.0, south), (east, south), goal])
@@ -236,7 +233,6 @@ def test_boats_of_the_solent_keep_off_the_land() -> None:
     """Between random places at sea, along paths that are at most half as long again, by no line over land."""
     planner: Any = build_planner(load_scenario("solent-patrol"), "jdm", 1)
     graph = visibility_graph(planner.constraints)
-    assert graph is not None
     zones = [own.zone for own in planner.constraints if isinstance(own, ZoneConstraint)]
     places = np.random.default_rng(3).uniform(-2900.0, 2900.0, (12, 2))
     sea = places[~forbidden(places, zones, 0.0)]

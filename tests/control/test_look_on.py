@@ -19,9 +19,11 @@ from vedette.control import (
     IndependentPlanner,
     JointPlanner,
     KullbackLeiblerReward,
+    MobileSensor,
     Plan,
 )
-from vedette.control.beyond_horizon import BeyondHorizon, attracting_targets
+from vedette.control.constraints import visibility_graph
+from vedette.control.cost_to_go import CostToGo, attracting_targets
 from vedette.control.evaluator import mean_over_horizons
 from vedette.control.evidence import Evidence
 from vedette.control.extrapolation import extrapolated
@@ -129,7 +131,7 @@ def test_a_camera_that_still_turns_turns_on() -> None:
 def looks(belief: LMB, poses: Any, sensors: Any = None) -> Any:
     of = placed(belief, poses, sensors)
     options = options_of(of.sensors, of.poses, of.settings)
-    return BeyondHorizon.of(of.sensors, options, *attracting_targets(belief), None, None).horizons(of.settings)
+    return CostToGo.of(of.sensors, options, *attracting_targets(belief), visibility_graph(), None).horizons(of.settings)
 
 
 EAST, WEST = [0.0, 0.0, 0.0], [-3000.0, 0.0, math.pi]
@@ -221,7 +223,9 @@ def prepared(of: Situation, horizon: Any = None, later: Any = (), hidden: Any = 
     """By itself, with another horizon, or with later ones."""
     options, settings = options_of(of.sensors, of.poses, KNOWN), of.settings
     if horizon is not None:
-        settings, options = horizon, tuple(extrapolated(own, HORIZON, horizon.horizon_times()) for own in options)
+        to_go = CostToGo.of(of.sensors, options, *attracting_targets(of.state.fused), visibility_graph(), None)
+        paths = np.repeat(to_go.places[:, np.newaxis], horizon.horizon_steps, axis=1)
+        settings, options = horizon, to_go.continued(HORIZON, horizon.horizon_times(), paths)
     return Evaluator.of_sums(
         of.sensors,
         options,
@@ -355,3 +359,84 @@ def test_longer_plans_contain_the_single_one() -> None:
 def test_threads_change_nothing() -> None:
     one, three = (made_by(JointPlanner, placed(bernoullis(FAR), POSES, num_threads=num)) for num in (1, 3))
     assert_same_plan(one, three)
+
+
+# the base policy
+
+EIGHT = tuple(float(own) for own in range(-135, 181, 45))
+
+
+@pytest.mark.parametrize("speeds", [(30.0, 0.0), (30.0,)])
+@pytest.mark.parametrize(("far", "num"), [(0.0, 0), (300.0, 1), (700.0, 1), (700.0, 3), (1200.0, 3)])
+def test_a_near_lost_target_is_visited_first(speeds: Any, far: float, num: int) -> None:
+    """One target is in view at 100 m, two steps lead to a second one behind it, and others are far off."""
+    places = np.array([[100.0, 0.0], [170.0, 0.0], *[[-far - 20.0 * i, 0.0] for i in range(num)]])
+    stds = [6.0, *[60.0] * (len(places) - 1)]
+    covs = [np.diag([std**2 / 2.0, std**2 / 2.0, 1.0, 1.0]) for std in stds]
+    states = np.concatenate([places, np.zeros_like(places)], axis=1)
+    belief = LMB.from_bernoullis([(1, i) for i in range(len(places))], [0.98] * len(places), states, covs)
+    clutter = models.around_sensor(1.0, "position", radius=120.0)
+    seer = models.SensorModel(
+        models.position(), models.constant_noise([4.0, 4.0]), models.limited_range(0.95, 120.0), clutter
+    )
+    calm = replace(CALM, motion=models.constant_velocity(0.5))
+    sensor = MobileSensor(LmbFilter(calm, seer), HeadingPlatform(speeds, EIGHT))
+    of = placed(belief, [EAST], (sensor,), horizon_steps=1, horizon_period=1.0)
+    plan = made_by(JointPlanner, of, ExpectedLossReward(50.0))
+    assert plan.actions[0].text(plan.chosen[0]).startswith("heading_deg 0, speed 30")
+
+
+def test_courses_meet_moving_targets_and_follow_them() -> None:
+    """A target crosses at 10 m/s; every course that leads to it ends on it, and its speed is the sum at most."""
+    options = options_of(short_sighted(1, HeadingPlatform(SPEED, EIGHT)), np.array([EAST]), KNOWN)
+    times = np.arange(9.0, 60.0)
+    path = np.column_stack([np.full(len(times), 700.0), 10.0 * times - 200.0])[np.newaxis]
+    start = path[:, 0] - [0.0, 10.0]
+    to_go = CostToGo.of(short_sighted(1), options, np.array([[0, 0]]), start, visibility_graph(), None)
+    [later] = to_go.continued(HORIZON, times, path)
+    offs = np.hypot(*(later.courses[:, :, :2] - path).transpose(2, 0, 1))
+    steps = np.hypot(*np.diff(later.courses[:, :, :2], axis=1).transpose(2, 0, 1))
+    best = EIGHT.index(0.0)
+    assert (steps <= SPEED + 10.0 + 1e-9).all()
+    assert (offs[best, times >= 8.0 + offs[best, 0] / SPEED + 2.0] < 1e-9).all()
+    assert (offs[best] < SIGHT).sum() > (offs[EIGHT.index(45.0)] < SIGHT).sum() > 0
+    assert (offs[EIGHT.index(180.0)] > 1000.0).any()  # it leads to no target
+
+
+def seen_loss(stds: Any, pose: Any, places: Any) -> Any:
+    """Standard deviations, m, after a step without noise in the world, and the loss of the step."""
+    grown = np.sqrt(np.square(stds) + 6.0**2)
+    after = np.where(np.hypot(*(places - pose).T) <= SIGHT, 5.0, grown)
+    return after, np.minimum(after, 60.0).sum()
+
+
+@pytest.mark.parametrize("seed", [2, 3, 4])
+def test_decisions_come_near_the_best_sequence_of_moves(seed: int) -> None:
+    """All sequences of eight moves are compared, with errors that grow while a target is out of view."""
+    rng, moves = np.random.default_rng(seed), 90.0 * np.array([[0, 0], [1, 0], [-1, 0], [0, 1], [0, -1]])
+    places, platform = rng.uniform(-500.0, 500.0, (3, 2)), GridPlatform(90.0, 90.0, (0.0, 180.0, 90.0, -90.0))
+    [sensor], depth = short_sighted(1, platform), 8
+    best = {(0, 0): [(np.full(3, 40.0), 0.0)]}
+    for _ in range(depth):
+        following: dict[Any, Any] = {}
+        for place, entries in best.items():
+            for move in moves:
+                at = np.array(place) + move
+                for stds, loss in entries:
+                    after, more = seen_loss(stds, at, places)
+                    kept = following.setdefault((int(at[0]), int(at[1])), [])
+                    if not any((own[0] <= after + 1e-9).all() and own[1] <= loss + more + 1e-9 for own in kept):
+                        kept.append((after, loss + more))
+        best = following
+    losses = [loss for entries in best.values() for _, loss in entries]
+    stds, pose, total = np.full(3, 40.0), np.zeros(3), 0.0
+    for _ in range(depth):
+        covs = [np.diag([std**2 / 2.0, std**2 / 2.0, 18.0, 18.0]) for std in stds]
+        states = np.concatenate([places, np.zeros_like(places)], axis=1)
+        belief = LMB.from_bernoullis([(1, i) for i in range(3)], [0.98] * 3, states, covs)
+        of = placed(belief, [pose], (sensor,), horizon_steps=1, horizon_period=1.0)
+        plan = made_by(JointPlanner, of)
+        pose = platform.course(pose, plan.chosen_actions[0], np.array([1.0]))[0]
+        stds, more = seen_loss(stds, pose[:2], places)
+        total += more
+    assert total <= 1.1 * min(losses)

@@ -150,9 +150,9 @@ def test_what_lies_beyond_the_next_decision_is_found(search: Any) -> None:
     belief = LMB.from_bernoullis([(0, 0)], [0.9], [[100.0, 200.0, 0.0, 0.0]], [np.diag([25.0, 25.0, 1.0, 1.0])])
     settings = replace(KNOWN, horizon_steps=1, horizon_period=1.0)
     given = Situation((sensor,), Clmb((1.0,)), settings, (belief,), belief, np.zeros((1, 3)))
-    myopic = decide(JointPlanner(given.sensors, given.fusion, settings), given)
-    assert np.ptp(myopic.tables[0].mean) < 1e-12
     reward = CauchySchwarzReward("reference")
+    myopic = decide(JointPlanner(given.sensors, given.fusion, settings, reward), given)
+    assert np.ptp(myopic.tables[0].mean) < 1e-12
     plan = decide(planner(given, reward, depth=3, search=search, budget=100), given)
     assert plan.sequence[0].sum(axis=0).tolist() == [100.0, 200.0]
     assert plan.expected_rewards[0][0] > 0.1

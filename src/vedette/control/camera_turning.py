@@ -24,11 +24,6 @@ def turn_rate(own: Options, horizon: float) -> float:
     return float(np.abs(wrap_angles(own.courses[:, -1, POINTING] - own.pose[POINTING])).max()) / horizon
 
 
-def views_per_second(own: Options, rate: float) -> float:
-    """Return how many fields of view a camera sweeps in a second, at `rate` rad/s."""
-    return rate / float(2.0 * own.pose[HALF_WIDTH]) if rate > 0.0 else 0.0
-
-
 def seconds_to_turn(own: Options, rate: float, places: Floats) -> Floats:
     """Return the seconds from the end of the best course until a camera has each place in its field of view.
 

@@ -10,14 +10,16 @@ import numpy as np
 
 from vedette.control.additive.rewards import AdditiveRewards
 from vedette.control.additive.table import lay_out
-from vedette.control.beyond_horizon import BeyondHorizon, attracting_targets
-from vedette.control.constraints import VisibilityGraph
-from vedette.control.prediction import predicted
+from vedette.control.constraints import VisibilityGraph, visibility_graph
+from vedette.control.cost_to_go import CostToGo, attracting_targets
+from vedette.control.prediction import Prediction, predicted
 from vedette.control.pseudo_posterior_rewards import PseudoPosteriorRewards, SampleRewards
 from vedette.control.rewards.base import LabelReward, PowerReward, Reward
 from vedette.control.rewards.power import ExpectedLossReward
 from vedette.control.settings import Belief, MobileSensor, PlanningSettings
 from vedette.densities.checks import offsets_of
+from vedette.densities.tracks import places_of
+from vedette.filters.inputs import model_errors
 from vedette.fusion import Fusion, LogLinearPool
 from vedette.kernels.base.types import Floats, Ints
 from vedette.kernels.planning.ascent import Cells
@@ -86,25 +88,27 @@ class Evaluator:
         """Return an evaluator by sums over labels, each followed over every course that reaches it; beliefs are LMBs.
 
         horizons: further horizons at whose ends the expected loss is evaluated as well; None: those that are needed
-        (`vedette.control.beyond_horizon.BeyondHorizon.horizons`). graph: of the zones that constraints forbid, for
+        (`vedette.control.cost_to_go.CostToGo.horizons`). graph: of the zones that constraints forbid, for
         paths beyond the horizon; None: there are none. Raises as `JointPlanner.plan`.
         """
         first, prediction = lay_out(sensors, options, rule, settings, reward, state, rng=rng)
-        due, beyond = isinstance(reward, ExpectedLossReward) if horizons is None else len(horizons) > 0, None
-        if due:
-            beyond = BeyondHorizon.of(sensors, options, *attracting_targets(prediction), graph, state.undetected)
-        if horizons is None:
-            horizons = () if beyond is None else beyond.horizons(settings)
-        rewards = [first]
+        rewards, notes = [first], dict[str, None]()
+        if isinstance(reward, ExpectedLossReward) and horizons != ():
+            zones = graph or visibility_graph()
+            to_go = CostToGo.of(sensors, options, *attracting_targets(prediction), zones, state.undetected)
+            horizons, notes = to_go.horizons(settings) if horizons is None else horizons, dict.fromkeys(to_go.notes())
+        horizons = horizons or ()
         for own in horizons:
-            assert beyond is not None
-            later = beyond.extrapolated(settings.horizon_times(), own.horizon_times())
+            with model_errors():
+                motion = sensors[0].filter.targets.motion
+                ahead = Prediction.of(state.fused, motion, own.horizon_steps, own.horizon_period)
+            paths = ahead.paths.means[places_of(to_go.labels, ahead.end.tracks.labels), :, :2]
+            later = to_go.continued(settings.horizon_times(), own.horizon_times(), paths)
             rewards.append(lay_out(sensors, later, rule, own, reward, state, rng=rng)[0])
         counts = {"filter_steps": 0, "rewards": 0}
         for each, own in zip(rewards, (settings, *horizons), strict=True):
             counts["filter_steps"] += len(each.table.labels) * each.num_samples * own.horizon_steps
         source = mean_over_horizons(rewards) if horizons else rewards[0]
-        notes = dict.fromkeys(() if beyond is None else beyond.notes())
         return cls(settings, tuple(options), prediction, source, source, counts, notes, horizons=horizons)
 
     def joint_shape(self) -> tuple[int, ...]:

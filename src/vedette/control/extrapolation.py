@@ -37,8 +37,8 @@ def extrapolated(own: Options, horizon: Floats, times: Floats) -> Options:
     return own._replace(courses=np.ascontiguousarray(courses), scans=scans)
 
 
-def write_path(course: Floats, corners: Floats, run: Floats, end: Floats, step: Floats) -> None:
-    """Write poses along a path into a course (num_times, pose_dim).
+def write_path(course: Floats, corners: Floats, run: Floats, end: Floats, step: Floats) -> Floats:
+    """Write poses along a path into a course (num_times, pose_dim); returns the fraction travelled at each such time.
 
     corners: (num_corners, 2) m, corners of the path.
     run: (num_times,) m, distance travelled from the end of the horizon on; 0 before.
@@ -47,8 +47,10 @@ def write_path(course: Floats, corners: Floats, run: Floats, end: Floats, step: 
     """
     legs = np.diff(corners, axis=0)
     passed = np.concatenate([[0.0], np.cumsum(np.hypot(legs[:, 0], legs[:, 1]))])
-    after, run = run > 0.0, np.minimum(run, passed[-1])
-    course[after, 0], course[after, 1] = (np.interp(run[after], passed, corners[:, axis]) for axis in (0, 1))
+    after = run > 0.0
+    run = np.minimum(run[after], passed[-1])
+    course[after, 0], course[after, 1] = (np.interp(run, passed, corners[:, axis]) for axis in (0, 1))
     if abs(math.remainder(end[2] - math.atan2(step[1], step[0]), 2.0 * math.pi)) < 1e-6:
-        leg = np.searchsorted(passed, run[after]).clip(1, len(legs)) - 1
+        leg = np.searchsorted(passed, run).clip(1, len(legs)) - 1
         course[after, 2] = np.arctan2(legs[leg, 1], legs[leg, 0])
+    return np.asarray(run / max(passed[-1], 1e-9))

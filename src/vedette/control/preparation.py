@@ -62,7 +62,7 @@ class Preparation:
         planned: beliefs and fusion in the form that they are planned on.
         options: for each sensor.
         mask: feasible joint actions; None: all.
-        graph: of the zones that constraints forbid; None: there are none.
+        graph: of the zones that constraints forbid.
     """
 
     sensors: tuple[MobileSensor, ...]
@@ -71,7 +71,7 @@ class Preparation:
     planned: PlanningBeliefs
     options: tuple[Options, ...]
     mask: Mask | None
-    graph: VisibilityGraph | None
+    graph: VisibilityGraph
 
     @classmethod
     def of(
@@ -87,11 +87,10 @@ class Preparation:
         """Return the preparation; raises `InputError` for invalid inputs."""
         options = options_of(sensors, poses, settings)
         planned = planning_beliefs(sensors, fusion, settings, reward, state)
-        mask, graph = None, None
+        mask = None
         if constraints:
             mask = mask_of_decision(constraints, sensors, options, state.fused, np.asarray(poses), settings)
-            graph = visibility_graph(constraints)
-        return cls(tuple(sensors), settings, reward, planned, options, mask, graph)
+        return cls(tuple(sensors), settings, reward, planned, options, mask, visibility_graph(constraints))
 
     @property
     def races(self) -> bool:

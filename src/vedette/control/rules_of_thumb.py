@@ -7,8 +7,8 @@ from typing import Literal, TypeAlias, get_args
 
 import numpy as np
 
-from vedette.control.beyond_horizon import BeyondHorizon
 from vedette.control.constraints import Constraint, VisibilityGraph, nearest_feasible, visibility_graph
+from vedette.control.cost_to_go import CostToGo
 from vedette.control.inputs import check_control_inputs, mask_of_decision, options_of, single_mask
 from vedette.control.plan import Plan
 from vedette.control.search import first_best
@@ -98,10 +98,8 @@ class RulePlanner:
         mask = mask_of_decision(self.constraints, self.sensors, options, state.fused, at, self.settings)
         estimate, graph = self.estimate(state.fused, state.step), visibility_graph(self.constraints)
         places = np.ascontiguousarray(np.asarray(estimate.means)[:, :2])
-        beyond = (
-            BeyondHorizon.of(self.sensors, options, estimate.labels, places, graph, None) if graph is not None else None
-        )
-        goals = self._goals(places, at[:, :2], beyond) if len(places) else [None] * len(options)
+        to_go = CostToGo.of(self.sensors, options, estimate.labels, places, graph, None)
+        goals = self._goals(places, to_go) if len(places) else [None] * len(options)
         merits = [_merits(own, goal, graph) for own, goal in zip(options, goals, strict=True)]
         joint = tuple(
             first_best(np.where(single_mask(mask, s, len(own)), own, -np.inf)) for s, own in enumerate(merits)
@@ -113,34 +111,31 @@ class RulePlanner:
                 )
             joint = nearest_feasible(mask, joint)
         chosen = tuple(own.first_action(course) for own, course in zip(options, joint, strict=True))
-        notes = (*(mask.notes if mask else ()), *(beyond.notes() if beyond else ()))
+        notes = (*(mask.notes if mask else ()), *to_go.notes())
         return Plan(self.name, tuple(own.actions for own in options), chosen, (), {}, notes)
 
-    def _goals(self, places: Floats, sensors: Floats, beyond: BeyondHorizon | None) -> Floats:
-        """Return (num_sensors, 2) m, goals of the sensors (num_sensors, 2) among the places (num_targets, 2)."""
+    def _goals(self, places: Floats, to_go: CostToGo) -> Floats:
+        """Return (num_sensors, 2) m, goals of the sensors among the places (num_targets, 2)."""
         if self.rule == "centroid":
-            return np.tile(places.mean(axis=0), (len(sensors), 1))
+            return np.tile(places.mean(axis=0), (len(self.sensors), 1))
         if self.rule == "assigned_target":
-            numbers = np.arange(len(sensors)) if self.targets is None else np.array(self.targets) - 1
+            numbers = np.arange(len(self.sensors)) if self.targets is None else np.array(self.targets) - 1
             return np.asarray(places[numbers % len(places)])
-        if beyond is not None:
-            return np.asarray(places[_nearest(beyond.distances())])
-        return np.asarray(places[_nearest(np.hypot(*(sensors[:, np.newaxis] - places).transpose(2, 0, 1)))])
+        return np.asarray(places[_nearest(to_go.distances())])
 
 
-def _merits(own: Options, goal: Floats | None, graph: VisibilityGraph | None) -> Floats:
+def _merits(own: Options, goal: Floats | None, graph: VisibilityGraph) -> Floats:
     """Return (num_courses,) the negative mean distance to a place; ties are broken by how well a camera points."""
     if goal is None:
         return np.zeros(len(own.courses))
     offsets = goal - own.courses[..., :2]
     gaps, waiting_costs = np.hypot(offsets[..., 0], offsets[..., 1]), np.zeros(len(own.courses))
-    if graph is not None:
-        paths, moves = graph.to(goal[np.newaxis], own.pose[:2]), (own.courses[..., :2] != own.pose[:2]).any(axis=(1, 2))
-        if not paths.are_straight(own.pose[np.newaxis, :2].copy())[0, 0]:  # The sensor may have to step aside first.
-            waiting_costs[~moves] = _WAITING
-        free = moves & ~graph.is_blocked(own.pose[:2], own.courses[..., :2])
-        around = paths.distances(own.courses[free, :, :2].reshape(-1, 2)).reshape(gaps[free].shape)
-        gaps[free] = np.where(np.isfinite(around), around, gaps[free])
+    paths, moves = graph.to(goal[np.newaxis], own.pose[:2]), (own.courses[..., :2] != own.pose[:2]).any(axis=(1, 2))
+    if not paths.are_straight(own.pose[np.newaxis, :2].copy())[0, 0]:  # The sensor may have to step aside first.
+        waiting_costs[~moves] = _WAITING
+    free = moves & ~graph.is_blocked(own.pose[:2], own.courses[..., :2])
+    around = paths.distances(own.courses[free, :, :2].reshape(-1, 2)).reshape(gaps[free].shape)
+    gaps[free] = np.where(np.isfinite(around), around, gaps[free])
     near: Floats = -gaps.mean(axis=1)
     if own.courses.shape[2] > HALF_WIDTH and (own.courses[..., HALF_WIDTH] > 0.0).any():
         turn = np.arctan2(offsets[..., 1], offsets[..., 0]) - own.courses[..., POINTING]

@@ -46,6 +46,10 @@ class VisibilityGraph:
         """Return the graph of zones, each the interior of polygons (num_corners, 2), m, by the even-odd rule."""
         from scipy.sparse.csgraph import shortest_path
 
+        none = np.empty((0, 2))
+        if not zones:
+            edges, nothing = Edges(none, none, np.empty(0, np.int64)), np.empty((0, 0))
+            return cls(edges, none, none, nothing, nothing.astype(np.int64))
         zones = [[ring[np.any(ring != np.roll(ring, 1, axis=0), axis=1)] for ring in rings] for rings in zones]
         pairs = [edges_of(rings) for rings in zones]
         starts, ends = (np.concatenate(each) for each in zip(*pairs, strict=True))
@@ -65,7 +69,10 @@ class VisibilityGraph:
 
         A goal inside a zone, or one that no path reaches, is approached as closely as paths from the start allow.
         """
-        points, origin = np.array(goals, np.float64, order="C"), self.outside(start[np.newaxis])
+        points, none = np.array(goals, np.float64, order="C"), np.empty((0, len(goals)))
+        if len(self.edges.zones) == 0:
+            return Paths(self, points, np.zeros(len(points)), none, none.astype(np.int64))
+        origin = self.outside(start[np.newaxis])
         from_origin = _added(clear_lengths(origin, self.nodes, self.edges), self.lengths)[0]
         for goal in np.flatnonzero(~self._are_linked(points, origin, from_origin)).tolist():
             near = (own for own in self._nearest(points[goal]) if self._are_linked(own, origin, from_origin)[0])
@@ -74,7 +81,7 @@ class VisibilityGraph:
         through = self.lengths[:, np.newaxis] + last
         distances = np.hypot(*(goals - points).T)
         if len(self.nodes) == 0:
-            return Paths(self, points, distances, np.empty((0, len(points))), np.empty((0, len(points)), np.int64))
+            return Paths(self, points, distances, none, none.astype(np.int64))
         return Paths(self, points, distances, through.min(axis=2), through.argmin(axis=2))
 
     def is_blocked(self, start: Floats, courses: Floats) -> Bools:
@@ -170,13 +177,13 @@ class Paths:
         return np.concatenate([begin, graph.nodes[chain[::-1]], self.points[goal][np.newaxis]])
 
 
-def visibility_graph(constraints: Sequence[Constraint]) -> VisibilityGraph | None:
-    """Return the visibility graph of the zones of constraints; None if they have none.
+def visibility_graph(constraints: Sequence[Constraint] = ()) -> VisibilityGraph:
+    """Return the visibility graph of the zones of constraints; without zones all paths are straight.
 
     The graph of the same zones is built once and shared by all decisions, planners and runs.
     """
     zones = [constraint.zone for constraint in constraints if provides(constraint, ZoneConstraint)]
-    return _built(tuple(tuple(ring.tobytes() for ring in rings) for rings in zones)) if zones else None
+    return _built(tuple(tuple(ring.tobytes() for ring in rings) for rings in zones))
 
 
 @lru_cache(maxsize=32)
@@ -192,7 +199,7 @@ def _added(first: Floats, then: Floats) -> Floats:
 
 def _inside(edges: Edges, points: Floats) -> Bools:
     """Return (num_points, num_zones) whether each point is inside each zone."""
-    inside = np.empty((len(points), int(edges.zones[-1]) + 1), np.bool_)
+    inside = np.empty((len(points), int(edges.zones.max(initial=-1)) + 1), np.bool_)
     for zone in range(inside.shape[1]):
         own = edges.zones == zone
         inside[:, zone] = inside_edges(points, (edges.starts[own], edges.ends[own]))
@@ -201,6 +208,8 @@ def _inside(edges: Edges, points: Floats) -> Bools:
 
 def _is_free(edges: Edges, points: Floats) -> Bools:
     """Return (num_points,) whether each point is in no zone and on no edge."""
+    if len(edges.zones) == 0:
+        return np.ones(len(points), np.bool_)
     inside = _inside(edges, points)
     return ~inside.any(axis=1) & np.isinf(first_touches(points, points, edges, np.zeros_like(inside)))
 

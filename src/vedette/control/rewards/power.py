@@ -110,7 +110,7 @@ class ExpectedLossReward(Checked):
 
     If no target is within detection range of a sensor during the horizon, or a target is out of range of all sensors,
     the loss is the mean of those at the end of the horizon and at two later times, for which sensors are assumed to
-    continue as they move (`vedette.control.beyond_horizon.BeyondHorizon.horizons`). Otherwise all courses of the sensor
+    go on to the targets that they approach (`vedette.control.cost_to_go.CostToGo`). Otherwise all courses of the sensor
     would have equal rewards.
 
     It assumes that the sensors' measurements are used in full, whatever the fusion.

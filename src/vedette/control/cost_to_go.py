@@ -1,4 +1,9 @@
-"""Targets beyond the horizon: how long sensors take to reach them, and how courses continue around forbidden zones."""
+"""The cost-to-go: the loss beyond the horizon, under a base policy that continues each course to a lost target.
+
+The loss of a course is that of the policy which begins with it (D. P. Bertsekas, Rollout, Policy Iteration, and
+Distributed Reinforcement Learning, 2020). The policy goes to one target by the shortest path around zones, meets it
+where it will be then, and follows it.
+"""
 
 from __future__ import annotations
 
@@ -8,7 +13,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from vedette.control.camera_turning import seconds_to_search, seconds_to_turn, turn_rate, views_per_second
+from vedette.control.camera_turning import seconds_to_search, seconds_to_turn, turn_rate
 from vedette.control.constraints import Paths, VisibilityGraph
 from vedette.control.extrapolation import extrapolated, write_path
 from vedette.control.settings import MobileSensor, PlanningSettings
@@ -16,7 +21,7 @@ from vedette.densities import LMB, UndetectedIntensity
 from vedette.kernels.base.types import Bools, Floats, Ints
 from vedette.models.functions import numbers_at
 from vedette.platforms import Options
-from vedette.platforms.camera import line_of_sight
+from vedette.platforms.camera import HALF_WIDTH, line_of_sight
 
 # Minimum existence probability of targets that sensors approach from beyond the horizon.
 _LEAST_EXISTENCE = 0.1
@@ -32,15 +37,15 @@ _SAME_PROGRESS, _LEAST_PROGRESS = 0.05, 1e-6
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class BeyondHorizon:
-    """Targets that attract sensors from beyond their horizon, and the data to continue courses towards them.
+class CostToGo:
+    """Targets that attract sensors, how long sensors take to reach them, and how courses continue towards them.
 
     Attributes:
         options: for each sensor, its options within the horizon.
         reaches: (num_sensors,) m, detection range of each sensor.
         labels: (num_targets, 2) labels of the targets that attract sensors.
         places: (num_targets, 2) m, expected positions of these targets.
-        paths: for each sensor, its paths to these positions; None: no zone is forbidden.
+        paths: for each sensor, its paths to these positions.
         undetected: intensity of undetected targets; None: not known.
     """
 
@@ -48,7 +53,7 @@ class BeyondHorizon:
     reaches: Floats
     labels: Ints
     places: Floats
-    paths: tuple[Paths, ...] | None
+    paths: tuple[Paths, ...]
     undetected: UndetectedIntensity | None
 
     @classmethod
@@ -58,36 +63,44 @@ class BeyondHorizon:
         options: Sequence[Options],
         labels: Ints,
         places: Floats,
-        graph: VisibilityGraph | None,
+        graph: VisibilityGraph,
         undetected: UndetectedIntensity | None,
-    ) -> BeyondHorizon:
-        """Return the data for these targets. graph: of the zones that constraints forbid; None: there are none."""
+    ) -> CostToGo:
+        """Return the data for these targets. graph: of the zones that constraints forbid."""
         reaches = np.array([detection_range(sensor, own.pose) for sensor, own in zip(sensors, options, strict=True)])
-        paths = None if graph is None else tuple(graph.to(places, own.pose[:2]) for own in options)
+        paths = tuple([graph.to(places, own.pose[:2]) for own in options])
         return cls(tuple(options), reaches, labels, places, paths, undetected)
 
     def horizons(self, settings: PlanningSettings) -> tuple[PlanningSettings, ...]:
         """Return settings of further horizons, halfway and at the end; none if every sensor can reach its targets.
 
         Within the horizon, a sensor with a detection range of 250 m that moves 20 m gains nothing from a target 300 m
-        away, and of courses with equal rewards the first is taken. Therefore all sensors are assumed to continue as
-        they move, until each sensor may have reached a target and each target may be reached by a sensor. The loss is
-        the mean over the losses at all these times. Targets that no feasible path brings into detection range do not
-        count. Cameras turn to targets too, and until they have searched the directions of nearly all undetected
-        targets. If an action switches a sensor off, there is at least one more horizon; otherwise the reward would not
-        depend on how the sensor moves meanwhile.
+        away, and of courses with equal rewards the first is taken. Therefore all courses are continued, until each
+        sensor may have reached a target and each target may be reached by a sensor. The cost-to-go is the mean over the
+        losses at all these times. Targets that no feasible path brings into detection range do not count. Cameras turn
+        to targets too, and until they have searched the directions of nearly all undetected targets. If an action
+        switches a sensor off, there is at least one more horizon; otherwise the reward would not depend on how the
+        sensor moves meanwhile.
         """
         horizon = settings.horizon_steps * settings.horizon_period
-        speeds, turns = self._rates(horizon)
+        farthest = [np.hypot(*(own.courses[:, -1, :2] - own.pose[:2]).T).max() for own in self.options]
+        speeds, turns = np.array(farthest) / horizon, np.array([turn_rate(own, horizon) for own in self.options])
         if not ((speeds > 0.0) | (turns > 0.0)).all():
             return ()
-        beyond = _STAY * max(self._seconds_to_targets(speeds, turns), self._seconds_to_search(turns))
+        beyond = self._seconds_to_targets(speeds, turns)
+        if self.undetected is not None and turns.any():
+            search = seconds_to_search(self.options, turns.tolist(), self.reaches, self.undetected, _LEAST_EXISTENCE)
+            beyond = max(beyond, search)
+        beyond *= _STAY
         if len(self.places) and not all([own.scans.any(axis=1).all() for own in self.options]):
             beyond = max(beyond, horizon)
         if beyond == 0.0:
             return ()
-        views = map(views_per_second, self.options, turns.tolist())
-        rate = max(float((speeds / self.reaches).max()), *views)
+        rates = (speeds / self.reaches).tolist()
+        rates += [
+            turn / (2.0 * own.pose[HALF_WIDTH]) for own, turn in zip(self.options, turns, strict=True) if turn > 0.0
+        ]
+        rate = float(max(rates))
         total = min(horizon + beyond, max(_MOST_STEPS / rate if rate > 0.0 else math.inf, 2.0 * horizon))
         num_steps = min(max(_LEAST_STEPS, math.ceil(total * rate)), _MOST_STEPS)
         return tuple(
@@ -95,16 +108,18 @@ class BeyondHorizon:
             for steps in (num_steps // 2, num_steps)
         )
 
-    def extrapolated(self, horizon: Floats, times: Floats) -> tuple[Options, ...]:
-        """Return the options with courses at `times` (num_times,) s, around forbidden zones. See `extrapolated`."""
+    def continued(self, horizon: Floats, times: Floats, paths: Floats) -> tuple[Options, ...]:
+        """Return the options with courses at `times` (num_times,) s, by the base policy. See `extrapolated`.
+
+        paths: (num_targets, num_times, 2) m, expected positions of the targets at these times.
+        """
         later = tuple(extrapolated(own, horizon, times) for own in self.options)
-        if self.paths is None:
-            return later
-        return tuple(self._around(s, own, horizon, times) for s, own in enumerate(later))
+        moved = paths - self.places[:, np.newaxis]
+        return tuple(self._continued(s, own, horizon, times, moved) for s, own in enumerate(later))
 
     def notes(self) -> tuple[str, ...]:
-        """Return notes on targets that no sensor can detect from any position on a feasible path."""
-        if self.paths is None:
+        """Return notes on targets that no sensor can detect from any position on a path around zones."""
+        if not any([len(paths.graph.edges.zones) for paths in self.paths]):
             return ()
         moves = [bool((own.courses[:, :, :2] != own.pose[:2]).any()) for own in self.options]
         visible = np.stack(
@@ -116,24 +131,12 @@ class BeyondHorizon:
         )
 
     def distances(self) -> Floats:
-        """Return distances (num_sensors, num_targets) m from sensors to targets by feasible paths; needs zones."""
-        assert self.paths is not None
+        """Return distances (num_sensors, num_targets) m from sensors to targets by feasible paths."""
         rows = zip(self.paths, self.options, strict=True)
         return np.concatenate([paths.distances(own.pose[np.newaxis, :2]) for paths, own in rows])
 
-    def _rates(self, horizon: float) -> tuple[Floats, Floats]:
-        """Return (num_sensors,) the speed, m/s, of each sensor's farthest course, and its largest turn rate, rad/s."""
-        speeds, turns = np.empty(len(self.options)), np.zeros(len(self.options))
-        for s, own in enumerate(self.options):
-            offsets = own.courses[:, -1, :2] - own.pose[:2]
-            speeds[s] = np.hypot(offsets[:, 0], offsets[:, 1]).max() / horizon
-            turns[s] = turn_rate(own, horizon)
-        return speeds, turns
-
     def _seconds_to_targets(self, speeds: Floats, turns: Floats) -> float:
         """Return the time, s, until each sensor may have reached a target and each target may be reached."""
-        if len(self.places) == 0:
-            return 0.0
         seconds = np.full((len(self.options), len(self.places)), np.inf)
         for s, (own, speed, rate) in enumerate(zip(self.options, speeds.tolist(), turns.tolist(), strict=True)):
             gaps = self._gaps(s) - self.reaches[s]
@@ -142,21 +145,15 @@ class BeyondHorizon:
             seconds[s, gaps <= 0.0] = 0.0
             if rate > 0.0:
                 seconds[s] = np.maximum(seconds[s], seconds_to_turn(own, rate, self.places))
-        longest = np.concatenate([seconds.min(axis=0), seconds.min(axis=1)])
+        longest = np.concatenate([seconds.min(axis=0), seconds.min(axis=1, initial=np.inf)])
         return float(np.where(np.isfinite(longest), longest, 0.0).max())
-
-    def _seconds_to_search(self, turns: Floats) -> float:
-        """Return the time, s, until cameras have searched for undetected targets; 0 without such cameras or targets."""
-        if self.undetected is None or not turns.any():
-            return 0.0
-        return seconds_to_search(self.options, turns.tolist(), self.reaches, self.undetected, _LEAST_EXISTENCE)
 
     def _gaps(self, s: int) -> Floats:
         """Return the distance (num_targets,) m from the best course's end to each target; straight if in range."""
         own = self.options[s]
         ends = np.ascontiguousarray(own.courses[:, -1, :2])
         straight = np.hypot(*(ends[:, np.newaxis] - self.places).transpose(2, 0, 1))
-        if self.paths is None:
+        if len(self.paths[s].graph.edges.zones) == 0:
             return np.asarray(straight.min(axis=0))
         barred = self.paths[s].graph.is_blocked(own.pose[:2], own.courses[:, :, :2])
         allowed = np.ones_like(barred) if barred.all() else ~barred
@@ -169,30 +166,32 @@ class BeyondHorizon:
 
     def _is_attainable(self, s: int) -> Bools:
         """Return (num_targets,) whether a sensor detects each target from the end of its path to it."""
-        assert self.paths is not None
         return np.asarray(self.paths[s].left <= self.reaches[s])
 
-    def _around(self, s: int, later: Options, horizon: Floats, times: Floats) -> Options:
-        """Return the continued courses of one sensor with zones: along a path to a target, or up to a zone.
+    def _continued(self, s: int, later: Options, horizon: Floats, times: Floats, moved: Floats) -> Options:
+        """Return the continued courses of one sensor: to a target and on with it, or straight up to a zone.
 
-        A course continues along the shortest path to a target if its straight continuation would touch a zone, or if it
-        approaches the target by a path with bends. It moves as fast as it approaches the target: the best course at its
-        own speed, a course with half the progress at half of this speed. At the target it stays. A course that
-        approaches no target stops short of the zone.
+        A course leads along the shortest path to the target that it approaches most. It moves as fast as it approaches
+        the target: the best course at its own speed, a course with half the progress at half of this speed. On the way
+        it shares the motion of the target in proportion, so that both meet, and then it follows the target. A course
+        that approaches no target continues straight, and stops short of a zone.
+
+        moved: (num_targets, num_times, 2) m, motion of the targets since the end of the horizon.
         """
-        assert self.paths is not None
         own, paths = self.options[s], self.paths[s]
-        here, ends = own.pose[np.newaxis, :2].copy(), np.ascontiguousarray(own.courses[:, -1, :2])
-        steps, rounds = ends - here, np.maximum(times - horizon[-1], 0.0) / horizon[-1]
+        ends = np.ascontiguousarray(own.courses[:, -1, :2])
+        steps, rounds = ends - own.pose[:2], np.maximum(times - horizon[-1], 0.0) / horizon[-1]
         open_share = paths.graph.free_fraction(ends, ends + rounds[-1] * steps)
         allowed = ~paths.graph.is_blocked(own.pose[:2], own.courses[:, :, :2])
         goals, advances = self._leads_to(s, ends, np.hypot(steps[:, 0], steps[:, 1]), allowed)
-        straight = paths.are_straight(ends) & paths.are_straight(here)
         courses, after = later.courses.copy(), rounds > 0.0
         for c in np.flatnonzero(steps.any(axis=1) & allowed).tolist():
-            if goals[c] >= 0 and not (straight[c, goals[c]] and open_share[c] == 1.0):
+            if goals[c] >= 0:
                 path = paths.path(ends[c], int(goals[c]))
-                write_path(courses[c], path, rounds * advances[c], own.courses[c, -1], steps[c])
+                share = write_path(courses[c], path, rounds * advances[c], own.courses[c, -1], steps[c])
+                shift = share[:, np.newaxis] * moved[goals[c], after]
+                start = np.ascontiguousarray(courses[c, after, :2])
+                courses[c, after, :2] += paths.graph.free_fraction(start, start + shift)[:, np.newaxis] * shift
             elif open_share[c] < 1.0:
                 share = np.minimum(rounds, open_share[c] * rounds[-1])[after, np.newaxis]
                 courses[c, after, :2] = ends[c] + share * steps[c]
@@ -207,7 +206,6 @@ class BeyondHorizon:
         leads to no target beyond detection range. ends: (num_courses, 2) m, end points of the courses. lengths:
         (num_courses,) m, from the pose.
         """
-        assert self.paths is not None
         now, then = (self.paths[s].distances(own) for own in (self.options[s].pose[np.newaxis, :2], ends))
         draws = self._is_attainable(s) & ~self._in_sight(s) & np.isfinite(then)
         counts = draws & (allowed & (lengths > 0.0))[:, np.newaxis]
@@ -215,10 +213,9 @@ class BeyondHorizon:
             return np.full(len(ends), -1), lengths
         progress = np.where(counts, now - np.where(counts, then, 0.0), -np.inf)
         best_courses, max_progress = progress.argmax(axis=0), progress.max(axis=0)
-        longest = lengths.max()
         with np.errstate(invalid="ignore"):
             share = np.where(
-                max_progress > _LEAST_PROGRESS, progress / max_progress, 1.0 + (progress - max_progress) / longest
+                max_progress > _LEAST_PROGRESS, progress / max_progress, 1.0 + (progress - max_progress) / lengths.max()
             )
         share = np.where(counts, np.maximum(share, 0.0), 0.0)
         largest = share.max(axis=1, keepdims=True)
