@@ -240,7 +240,7 @@ def test_boats_of_the_solent_keep_off_the_land() -> None:
     paths = graph.to(sea, sea[0])
     shares, bends = np.linspace(0.0, 1.0, 50)[:, np.newaxis], 0
     for goal in np.flatnonzero(paths.left == 0.0).tolist():
-        path = paths.path(sea[0], goal)
+        path = paths.paths(sea[:1], np.array([goal]))[0]
         bends += len(path) - 2
         for a, b in pairwise(path):
             assert not forbidden(a + shares * (b - a), zones).any()

@@ -45,7 +45,7 @@ WALL = KeepOut(Region(0.0, 20.0, -80.0, 80.0))
 def test_around_a_rectangle_by_its_nearer_end(y: float, corner: float) -> None:
     start, goal = (-4.0, y), (100.0, y)
     assert distance((WALL,), start, goal) == pytest.approx(legs(start, (0, corner), (20, corner), goal), abs=CLOSE)
-    path = to((WALL,), [goal], start).path(np.array(start), 0)
+    path = to((WALL,), [goal], start).paths(np.array([start]), np.array([0]))[0]
     np.testing.assert_allclose(path, [start, (0, corner), (20, corner), goal], atol=0.002)
 
 
@@ -182,7 +182,7 @@ def test_random_zones(seed: int) -> None:
                 continue
             length = found[goal] - np.hypot(*(origin - start)) - paths.left[goal]
             assert length == pytest.approx(wanted, rel=1e-3, abs=0.05)
-            path = paths.path(start, goal)
+            path = paths.paths(start[np.newaxis], np.array([goal]))[0]
             assert legs(*path) == pytest.approx(found[goal] - paths.left[goal], abs=1e-9)
             shares = np.linspace(0.0, 1.0, 100)[:, np.newaxis]
             for a, b in pairwise(path):

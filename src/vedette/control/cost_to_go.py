@@ -15,7 +15,7 @@ import numpy as np
 
 from vedette.control.camera_turning import seconds_to_search, seconds_to_turn, turn_rate
 from vedette.control.constraints import Paths, VisibilityGraph
-from vedette.control.extrapolation import extrapolated, write_path
+from vedette.control.extrapolation import extrapolated, walked
 from vedette.control.settings import MobileSensor, PlanningSettings
 from vedette.densities import LMB, UndetectedIntensity
 from vedette.kernels.base.types import Bools, Floats, Ints
@@ -34,6 +34,7 @@ _LEAST_STEPS, _MOST_STEPS = 4, 12
 # A course leads to the target that it approaches most, as a fraction of the progress of the best course. If these
 # fractions differ by at most the first number, it leads to the nearest target. Second number: minimum progress, m.
 _SAME_PROGRESS, _LEAST_PROGRESS = 0.05, 1e-6
+_SAME_HEADING = 1e-12  # 1 minus the cosine of two headings that are taken for one, 1e-6 rad apart
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -111,11 +112,11 @@ class CostToGo:
     def continued(self, horizon: Floats, times: Floats, paths: Floats) -> tuple[Options, ...]:
         """Return the options with courses at `times` (num_times,) s, by the base policy. See `extrapolated`.
 
-        paths: (num_targets, num_times, 2) m, expected positions of the targets at these times.
+        times: the last is the latest. paths: (num_targets, num_times, 2) m, expected positions of the targets then.
         """
-        later = tuple(extrapolated(own, horizon, times) for own in self.options)
+        later = tuple([extrapolated(own, horizon, times) for own in self.options])
         moved = paths - self.places[:, np.newaxis]
-        return tuple(self._continued(s, own, horizon, times, moved) for s, own in enumerate(later))
+        return tuple([self._continued(s, own, horizon, times, moved) for s, own in enumerate(later)])
 
     def notes(self) -> tuple[str, ...]:
         """Return notes on targets that no sensor can detect from any position on a path around zones."""
@@ -184,17 +185,20 @@ class CostToGo:
         open_share = paths.graph.free_fraction(ends, ends + rounds[-1] * steps)
         allowed = ~paths.graph.is_blocked(own.pose[:2], own.courses[:, :, :2])
         goals, advances = self._leads_to(s, ends, np.hypot(steps[:, 0], steps[:, 1]), allowed)
-        courses, after = later.courses.copy(), rounds > 0.0
-        for c in np.flatnonzero(steps.any(axis=1) & allowed).tolist():
-            if goals[c] >= 0:
-                path = paths.path(ends[c], int(goals[c]))
-                share = write_path(courses[c], path, rounds * advances[c], own.courses[c, -1], steps[c])
-                shift = share[:, np.newaxis] * moved[goals[c], after]
-                start = np.ascontiguousarray(courses[c, after, :2])
-                courses[c, after, :2] += paths.graph.free_fraction(start, start + shift)[:, np.newaxis] * shift
-            elif open_share[c] < 1.0:
-                share = np.minimum(rounds, open_share[c] * rounds[-1])[after, np.newaxis]
-                courses[c, after, :2] = ends[c] + share * steps[c]
+        moves, after, courses = steps.any(axis=1) & allowed, np.flatnonzero(rounds > 0.0), later.courses.copy()
+        led, stopped = np.flatnonzero(moves & (goals >= 0)), np.flatnonzero(moves & (goals < 0) & (open_share < 1.0))
+        if len(led):
+            corners = paths.paths(ends[led], goals[led])
+            places, headings, share = walked(corners, rounds[after] * advances[led, np.newaxis])
+            shift = share[..., np.newaxis] * moved[goals[led]][:, after]
+            begin, end = places.reshape(-1, 2), (places + shift).reshape(-1, 2)
+            free = paths.graph.free_fraction(begin, end).reshape(share.shape)
+            courses[led[:, np.newaxis], after, :2] = places + free[..., np.newaxis] * shift
+            offset = own.courses[led, -1, 2] - np.arctan2(steps[led, 1], steps[led, 0])
+            ahead = np.cos(offset) > 1.0 - _SAME_HEADING  # a sensor that heads where it moves does so on its path
+            courses[led[ahead, np.newaxis], after, 2] = headings[ahead]
+        share = np.minimum(rounds[after], open_share[stopped, np.newaxis] * rounds[-1])[..., np.newaxis]
+        courses[stopped[:, np.newaxis], after, :2] = ends[stopped, np.newaxis] + share * steps[stopped, np.newaxis]
         return later._replace(courses=courses)
 
     def _leads_to(self, s: int, ends: Floats, lengths: Floats, allowed: Bools) -> tuple[Ints, Floats]:

@@ -98,13 +98,15 @@ class Evaluator:
             to_go = CostToGo.of(sensors, options, *attracting_targets(prediction), zones, state.undetected)
             horizons, notes = to_go.horizons(settings) if horizons is None else horizons, dict.fromkeys(to_go.notes())
         horizons = horizons or ()
-        for own in horizons:
+        if horizons:
+            motion, times = sensors[0].filter.targets.motion, [own.horizon_times() for own in horizons]
             with model_errors():
-                motion = sensors[0].filter.targets.motion
-                ahead = Prediction.of(state.fused, motion, own.horizon_steps, own.horizon_period)
-            paths = ahead.paths.means[places_of(to_go.labels, ahead.end.tracks.labels), :, :2]
-            later = to_go.continued(settings.horizon_times(), own.horizon_times(), paths)
-            rewards.append(lay_out(sensors, later, rule, own, reward, state, rng=rng)[0])
+                ahead = [Prediction.of(state.fused, motion, own.horizon_steps, own.horizon_period) for own in horizons]
+            paths = [own.paths.means[places_of(to_go.labels, own.end.tracks.labels), :, :2] for own in ahead]
+            later = to_go.continued(settings.horizon_times(), np.concatenate(times), np.concatenate(paths, axis=1))
+            for own, end in zip(horizons, np.cumsum([len(each) for each in times]).tolist(), strict=True):
+                part = [each.at(slice(end - own.horizon_steps, end)) for each in later]
+                rewards.append(lay_out(sensors, part, rule, own, reward, state, rng=rng)[0])
         counts = {"filter_steps": 0, "rewards": 0}
         for each, own in zip(rewards, (settings, *horizons), strict=True):
             counts["filter_steps"] += len(each.table.labels) * each.num_samples * own.horizon_steps

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 
 from vedette.control.camera_turning import turned_on
@@ -37,20 +35,16 @@ def extrapolated(own: Options, horizon: Floats, times: Floats) -> Options:
     return own._replace(courses=np.ascontiguousarray(courses), scans=scans)
 
 
-def write_path(course: Floats, corners: Floats, run: Floats, end: Floats, step: Floats) -> Floats:
-    """Write poses along a path into a course (num_times, pose_dim); returns the fraction travelled at each such time.
+def walked(corners: Floats, distances: Floats) -> tuple[Floats, Floats, Floats]:
+    """Return places (num, num_times, 2) on polylines, headings there, rad, and the fraction of the line up to them.
 
-    corners: (num_corners, 2) m, corners of the path.
-    run: (num_times,) m, distance travelled from the end of the horizon on; 0 before.
-    end: the pose (pose_dim,) at the end of the horizon.
-    step: (2,) m, from the present pose to it. A sensor that heads in its direction of motion does so on the path.
+    corners: (num, num_corners, 2) m. distances: (num, num_times) m from the first corner; beyond the last one, at it.
     """
-    legs = np.diff(corners, axis=0)
-    passed = np.concatenate([[0.0], np.cumsum(np.hypot(legs[:, 0], legs[:, 1]))])
-    after = run > 0.0
-    run = np.minimum(run[after], passed[-1])
-    course[after, 0], course[after, 1] = (np.interp(run, passed, corners[:, axis]) for axis in (0, 1))
-    if abs(math.remainder(end[2] - math.atan2(step[1], step[0]), 2.0 * math.pi)) < 1e-6:
-        leg = np.searchsorted(passed, run).clip(1, len(legs)) - 1
-        course[after, 2] = np.arctan2(legs[leg, 1], legs[leg, 0])
-    return np.asarray(run / max(passed[-1], 1e-9))
+    legs = np.diff(corners, axis=1)
+    lengths = np.hypot(legs[..., 0], legs[..., 1])
+    passed = np.concatenate([np.zeros((len(legs), 1)), np.cumsum(lengths, axis=1)], axis=1)
+    along, row = np.minimum(distances, passed[:, -1:]), np.arange(len(legs))[:, np.newaxis]
+    leg = (along[..., np.newaxis] > passed[:, np.newaxis, 1:-1]).sum(axis=2)
+    share = ((along - passed[row, leg]) / np.maximum(lengths[row, leg], 1e-9))[..., np.newaxis]
+    headings = np.arctan2(legs[..., 1], legs[..., 0])[row, leg]
+    return corners[row, leg] + share * legs[row, leg], headings, along / np.maximum(passed[:, -1:], 1e-9)

@@ -54,6 +54,10 @@ class Options(NamedTuple):
         """Return the first action that leads to a course."""
         return int(np.flatnonzero(self.which == course)[0])
 
+    def at(self, times: slice) -> Options:
+        """Return the options at some of the times of their courses."""
+        return self._replace(courses=np.ascontiguousarray(self.courses[:, times]), scans=self.scans[:, times])
+
 
 class Abilities(NamedTuple):
     """The optional members that a platform has beyond those of `Platform`."""

@@ -164,8 +164,19 @@ class Paths:
             lengths = np.minimum(lengths, around)
         return np.asarray(np.hypot(*(origins - starts).T)[:, np.newaxis] + lengths + self.left)
 
-    def path(self, start: Floats, goal: int) -> Floats:
-        """Return the shortest path (num_corners, 2) m from a start (2,) to the point of a goal; a path must exist."""
+    def paths(self, starts: Floats, goals: Ints) -> Floats:
+        """Return the shortest paths (num, num_corners, 2) m from starts (num, 2) to goals (num,), which must exist.
+
+        Paths with fewer corners stay at the last one.
+        """
+        if len(self.graph.edges.zones) == 0:
+            return np.stack([starts, self.points[goals]], axis=1)
+        found = [self._path(start, goal) for start, goal in zip(starts, goals.tolist(), strict=True)]
+        most = max(map(len, found))
+        return np.stack([np.concatenate([each, each[-1:].repeat(most - len(each), axis=0)]) for each in found])
+
+    def _path(self, start: Floats, goal: int) -> Floats:
+        """Return the shortest path (num_corners, 2) m from a start (2,) to the point of a goal."""
         graph, origin = self.graph, self.graph.outside(start[np.newaxis])
         begin = start[np.newaxis] if np.array_equal(origin[0], start) else np.stack([start, origin[0]])
         if self.are_straight(origin)[0, goal]:
