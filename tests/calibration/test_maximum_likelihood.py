@@ -100,3 +100,7 @@ def test_far_from_the_maximum_it_did_not_converge(monkeypatch: pytest.MonkeyPatc
     monkeypatch.setattr("vedette.calibration.maximum_likelihood._MOST_STEPS", 1)
     far, unknown, blocks = np.array([60.0]), np.array([100.0]), np.arange(20)
     assert not maximise(lambda at: np.full(20, -0.5 * (at[0] - 1.0) ** 2), far, unknown, [[0]], blocks).converged
+
+
+def test_a_single_block_gives_no_standard_error() -> None:
+    assert (stds_from_blocks(np.ones((3, 2)), np.eye(2), np.zeros(3, np.int64)) == np.inf).all()

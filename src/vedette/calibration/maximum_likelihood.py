@@ -158,10 +158,13 @@ def stds_from_blocks(scores: Floats, cov: Floats, blocks: Ints) -> Floats:
     """(p,) standard errors of a maximum from its scores, for quantiles of the normal distribution.
 
     Terms may depend on each other within a block, as errors do that last for some scans. cov: (p, p) covariance if all
-    terms were independent; its product with the scores of a block is the influence of that block on the maximum.
+    terms were independent; its product with the scores of a block is the influence of that block on the maximum. The
+    standard errors are inf for a single block.
     """
     influences = np.asarray(block_scores(scores, blocks) @ cov)
     num = len(influences)
+    if num < 2:
+        return np.full(len(cov), np.inf)
     widening = stdtrit(num - 1, 0.975) / stdtrit(np.inf, 0.975)  # of few blocks
     return np.asarray(np.sqrt((influences**2).sum(axis=0) * num / (num - 1)) * widening)
 

@@ -1,4 +1,4 @@
-"""Where a sensor's detections and false measurements differ from its model: by range, and by sector."""
+"""Tests of a sensor's detections and false measurements by range and by sector."""
 
 from __future__ import annotations
 
