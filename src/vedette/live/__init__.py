@@ -1,8 +1,9 @@
 """Live tracking: lines of JSON with scans in, estimates and plans out; recorded, and resumed after interruptions."""
 
+from vedette.live.answers import Answer, encode_line
 from vedette.live.building import build_live_loop
 from vedette.live.lines import LineSplitter, iter_lines
-from vedette.live.loop import Answer, LiveLoop, LiveState, encode_line
+from vedette.live.loop import LiveLoop, LiveState
 from vedette.live.messages import MAX_LINE_BYTES, Message, read_message
 from vedette.live.persistence import PersistentLoop
 from vedette.live.server import LineServer, TcpServer

@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import json
 import math
 from bisect import bisect_right
 from dataclasses import dataclass, field, replace
-from typing import Any, TypeAlias
 
 import numpy as np
 
@@ -17,11 +15,12 @@ from vedette.evaluation.innovations import Assumed
 from vedette.evaluation.track_formats import utc_text
 from vedette.internal.quantities import COMPONENTS, HEIGHT_DEPENDENT, PLACED
 from vedette.kernels.base.types import Floats
+from vedette.live.answers import Answer, plan_answer, track_answers
 from vedette.live.fit import LiveFit
 from vedette.live.messages import Message, read_message
 from vedette.models.arguments import reject
 from vedette.models.row_noise import measured_part
-from vedette.platforms.compass import Compass, PlaneCompass, courses_of
+from vedette.platforms.compass import Compass, PlaneCompass
 from vedette.recorded import Conventions, Origin, RecordedSensor
 from vedette.recorded.extents import beyond_reach, is_within, places_of
 from vedette.recorded.merging import Spread, merged_scan
@@ -29,7 +28,6 @@ from vedette.simulation.journal import error_cause
 from vedette.simulation.loop import PLANNER
 from vedette.tracking import OutOfSequenceTracker, SensorScan, Timeline
 
-Answer: TypeAlias = dict[str, Any]
 # Number of consecutive scans that must agree on a time far ahead before it is accepted, since all sensors may have been
 # silent for long. If they are all from one of several sensors, more are needed, as it may only be the fastest one.
 _MIN_AGREEING, _MIN_AGREEING_ALONE = 3, 10
@@ -221,24 +219,8 @@ class LiveLoop:
         belief = timeline.state
         assert belief.time is not None  # a scan was taken, or one before it
         estimate = self.estimate(belief.fused, belief.step)
-        names = ("x", "y", "vx", "vy")[: 4 if estimate.means.shape[1] >= 4 else 2]
-        names = (*names, "z", "vz") if any(site.kind in HEIGHT_DEPENDENT for site in self.sites) else names
-        stds = np.sqrt(np.diagonal(estimate.covs, axis1=1, axis2=2))[:, : len(names)]
-        tracks: list[Answer] = []
-        for label, mean, std, existence in zip(
-            estimate.labels.tolist(), estimate.means.tolist(), stds.tolist(), estimate.existence.tolist(), strict=True
-        ):
-            components = dict(zip(names, mean, strict=False))
-            tracks.append({"label": ".".join(map(str, label)), **components, "std": std, "existence": existence})
-        for track, probs in zip(tracks, estimate.class_probs.tolist() if self.classes else (), strict=False):
-            track["classes"] = dict(zip(self.classes, probs, strict=True))
-        if self.origin is not None and tracks:
-            for track, (lon, lat) in zip(tracks, self.origin.to_degrees(estimate.means[:, :2]).tolist(), strict=True):
-                track.update(lon=lon, lat=lat)
-        compass = self.compass
-        if compass is not None and len(names) >= 4:
-            for track, (course, speed) in zip(tracks, courses_of(compass, estimate.means).tolist(), strict=True):
-                track.update(course_deg=course, speed_mps=speed)
+        has_heights = any(site.kind in HEIGHT_DEPENDENT for site in self.sites)
+        tracks = track_answers(estimate, self.classes, self.origin, self.compass, has_heights=has_heights)
         counts = {"late": timeline.num_late, "dropped": timeline.num_dropped, "repeated": timeline.num_repeated}
         return {"line": state.num_lines, **self._line_time(state, belief.time), "tracks": tracks, **counts}
 
@@ -265,14 +247,8 @@ class LiveLoop:
         seeds = np.random.SeedSequence(self.seed, spawn_key=(0, PLANNER, state.num_decisions))
         try:
             plan = self.planner.plan(timeline.state, timeline.poses, rng=np.random.default_rng(seeds))
-            actions = [
-                {"sensor": site.name, **dict(zip(own.columns, row.tolist(), strict=True))}
-                for site, own, row in zip(self.sites, plan.actions, plan.chosen_actions, strict=True)
-            ]
-            rewards = [{"mean": mean, "standard_error": error} for mean, error in plan.expected_rewards]
-            answer = {**self._line_time(state, now), "planner": plan.planner, "actions": actions}
-            answer |= {"expected_rewards": rewards, "notes": plan.notes}
-            return after, {"line": state.num_lines, "plan": {**answer, "why": _explanation(plan)}}
+            answer = plan_answer(plan, [site.name for site in self.sites])
+            return after, {"line": state.num_lines, "plan": {**self._line_time(state, now), **answer}}
         except Exception as error:  # as above; the scan itself was processed
             answer = {
                 "line": state.num_lines,
@@ -281,29 +257,5 @@ class LiveLoop:
             return replace(after, num_errors=after.num_errors + 1), answer
 
 
-def _explanation(plan: Any) -> str:
-    try:
-        return str(plan.explain())
-    except VedetteError as error:
-        return f"not known: {error}"
-
-
 def _error_answer(state: LiveState, text: str) -> tuple[LiveState, tuple[Answer, ...]]:
     return replace(state, num_errors=state.num_errors + 1), ({"line": state.num_lines, "error": text},)
-
-
-def encode_line(answer: Answer) -> bytes:
-    """Return an answer as a line of JSON, with its end. Numbers that are not finite become null."""
-    try:
-        text = json.dumps(answer, ensure_ascii=False, allow_nan=False)
-    except ValueError:
-        text = json.dumps(_finite(answer), ensure_ascii=False, allow_nan=False)
-    return text.encode("utf-8", "replace") + b"\n"
-
-
-def _finite(value: Any) -> Any:
-    if isinstance(value, dict):
-        return {key: _finite(each) for key, each in value.items()}
-    if isinstance(value, list):
-        return [_finite(each) for each in value]
-    return None if isinstance(value, float) and not math.isfinite(value) else value

@@ -12,8 +12,9 @@ from typing import Any, BinaryIO
 
 from vedette.errors import InputError
 from vedette.internal.files import lock_beside
+from vedette.live.answers import Answer
 from vedette.live.lines import CHUNK, LineSplitter
-from vedette.live.loop import Answer, LiveLoop, LiveState
+from vedette.live.loop import LiveLoop, LiveState
 from vedette.live.messages import MAX_LINE_BYTES, is_message
 from vedette.tracking import load_snapshot, save_snapshot
 

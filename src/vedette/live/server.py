@@ -15,8 +15,8 @@ from operator import itemgetter
 from typing import Protocol
 
 from vedette.errors import InputError
+from vedette.live.answers import Answer, encode_line
 from vedette.live.lines import CHUNK, LineSplitter
-from vedette.live.loop import Answer, encode_line
 from vedette.live.messages import MAX_LINE_BYTES
 from vedette.live.remarks import Remarks
 from vedette.simulation.journal import error_cause
