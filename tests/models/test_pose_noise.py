@@ -84,3 +84,11 @@ def test_covariances_below_0_are_refused() -> None:
         models.with_row_noise([[1.0, 500.0]], [[1.0, 1.0]], added=[-MORE])
     with pytest.raises(InputError, match="covs: expected symmetric positive definite"):
         models.with_row_noise([[1.0, 500.0]], [-MORE])
+
+
+def test_an_altitude_above_the_slant_range_leaves_a_distance_on_the_ground() -> None:
+    """A target is at most 45 degrees above the sensor, so that the bearing's noise is bounded."""
+    added = pose_noise(
+        [0.4, 500.0, 900.0], COMPONENTS["bearing_range_altitude"], [0.0, 0.0, 0.0], PoseStds(x=1.0, y=1.0)
+    )
+    assert added[0, 0] == pytest.approx(2.0 / 500.0**2)
