@@ -48,7 +48,7 @@ class LiveState:
         claimants: sensors of the consecutive scans that agreed on it.
         due: time of the next decision in s; inf: none.
         num_decisions: number of decisions so far.
-        spreads: fields of `vedette.recorded.merging.Spread` for the returns of each sensor.
+        spreads: of the returns of each sensor.
         fit: of the assumed model to the latest scans.
     """
 
@@ -62,7 +62,7 @@ class LiveState:
     claimants: tuple[int, ...] = ()
     due: float = math.inf
     num_decisions: int = 0
-    spreads: tuple[tuple[float, ...], ...] = ()
+    spreads: tuple[Spread, ...] = ()
     fit: LiveFit = field(default_factory=LiveFit)
 
 
@@ -119,7 +119,7 @@ class LiveLoop:
     def initial(self) -> LiveState:
         """Return the state before the first line."""
         num = len(self.sites)
-        return LiveState(self.tracker.initial(), latest=(-math.inf,) * num, spreads=((0, 0.0),) * num)
+        return LiveState(self.tracker.initial(), latest=(-math.inf,) * num, spreads=(Spread(),) * num)
 
     def process(self, state: LiveState, line: bytes) -> tuple[LiveState, tuple[Answer, ...]]:
         """Process a line; answer with the estimates and, if one was due, a plan, or with the error in the line.
@@ -161,6 +161,8 @@ class LiveLoop:
             fit = before.fit.continued(before.timeline, after.timeline, self.estimate, self.assumed)
         except Exception as error:  # of custom models; tests never stop the stream
             fit = LiveFit(searched=f"nothing, as {error_cause(error)}")
+        if fit.found is before.fit.found:  # most lines test nothing
+            return replace(after, fit=fit), ()
         new, gone = fit.without(before.fit.fit.findings), before.fit.without(fit.fit.findings)
         remark = {"line": after.num_lines, **self._line_time(after, after.timeline.newest or 0.0)}
         remark["fit"] = {"new": [x.text for x in new], "gone": [x.text for x in gone], **fit.fit.to_dict()}
@@ -182,9 +184,9 @@ class LiveLoop:
         if not self.extents or self.extents[s] <= 0.0 or not len(rows):
             return state, scan
         kind = self.sites[s].kind
-        means, _, spread = merged_scan(rows, np.asarray(scan.pose), kind, self.extents[s])
-        spread += Spread(int(state.spreads[s][0]), state.spreads[s][1])
-        state = replace(state, spreads=(*state.spreads[:s], tuple(spread), *state.spreads[s + 1 :]))
+        means, _, own = merged_scan(rows, np.asarray(scan.pose), kind, self.extents[s])
+        spread = state.spreads[s] + own
+        state = replace(state, spreads=(*state.spreads[:s], spread, *state.spreads[s + 1 :]))
         return state, replace(scan, measurements=spread.added_to(means, kind) if spread.squares else means)
 
     def _on_clock(self, state: LiveState, message: Message, place: str) -> tuple[LiveState, float]:

@@ -28,7 +28,7 @@ FORMAT_VERSION = 1
 
 # Packages whose data classes may occur in a file; they hold arrays and open no files.
 _PACKAGES: tuple[str, ...] = ("densities", "filters", "fusion", "tracking", "models", "control", "calibration")
-_PACKAGES += ("kernels.base", "evaluation.fit", "evaluation.innovations", "live.fit")
+_PACKAGES += ("kernels.base", "evaluation.fit", "evaluation.innovations", "live.fit", "recorded.merging")
 _BITS = {kind.__name__: kind for kind in (np.random.PCG64, np.random.PCG64DXSM, np.random.SFC64, np.random.Philox)}
 _PLAIN = (bool, int, str, type(None))
 
