@@ -14,7 +14,7 @@ import numpy as np
 from vedette.errors import NumericalError
 from vedette.kernels.base.compile import borrowing, inlined, kernel
 from vedette.kernels.base.types import Floats, Sensor
-from vedette.kernels.gaussian.detection import detection_probability
+from vedette.kernels.gaussian.detection import detection_within
 from vedette.kernels.gaussian.innovation import Innovation, expect_measurement, make_innovation
 from vedette.kernels.gaussian.linalg import cholesky, inverse_from_factor
 from vedette.kernels.gaussian.prediction import predict
@@ -103,7 +103,7 @@ def _is_seen(
         pose, state, detections[h] = decision.horizon.poses[course, h], work.scratch.points[0], 0.0
         if not is_beyond(belief.paths, belief.radii, decision.horizon, course, label, h, reach):
             mean, cov = paths.means[label, h], paths.covs[label, h]
-            detections[h] = detection_probability(decision.sensor, pose, mean, cov, state)
+            detections[h] = detection_within(decision.sensor, pose, mean, cov, state, reach)
             seen |= detections[h] >= least
     return seen
 
