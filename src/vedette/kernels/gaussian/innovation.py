@@ -176,6 +176,24 @@ def condition(
 
 
 @inlined
+def condition_linear(
+    mean: Floats, cov: Floats, factor: Floats, cross: Floats, scratch: Scratch, posterior: Floats
+) -> None:
+    """Write factor, cross and posterior of a measurement by the Jacobian and the noise of the scratch."""
+    n, m, jacobian, noise = cov.shape[0], factor.shape[0], scratch.measurement_jacobian, scratch.measurement_noise
+    innovation = scratch.innovation_cov
+    # A constant size is unrolled by the compiler.
+    if n == 4 and m == 2:
+        project(jacobian, cov, cross, innovation, 4, 2)
+        exact = condition(cov, noise, innovation, factor, cross, posterior, 4, 2)
+    else:
+        project(jacobian, cov, cross, innovation, n, m)
+        exact = condition(cov, noise, innovation, factor, cross, posterior, n, m)
+    if not exact:
+        posterior_of_squares(mean, cov, factor, cross, PointWeights(0, 0.0, 0.0), scratch, posterior)
+
+
+@inlined
 def _has_height(jacobian: Floats, n: int, m: int) -> bool:
     """Return True if the measurement depends on component `HEIGHT` of a state with a vertical velocity behind it."""
     if n > HEIGHT + 1:
@@ -276,8 +294,7 @@ def expect_measurement(
     n, m = mean.shape[0], out.predicted.shape[1]
     jacobian, noise, innovation = scratch.measurement_jacobian, scratch.measurement_noise, scratch.innovation_cov
     factor, cross, posterior = out.factor[at], out.whitened_cross[at], out.covs[at]
-    linearised, weights = sensor.method == LINEARISED or sensor.method == SWITCHED, PointWeights(0, 0.0, 0.0)
-    log_uniform = 0.0
+    linearised, log_uniform = sensor.method == LINEARISED or sensor.method == SWITCHED, 0.0
     sensor.measurement_noise_cov(mean, pose, sensor.noise_params, noise)
     replace_noise(measurement, noise)
     if linearised:
@@ -286,20 +303,13 @@ def expect_measurement(
         log_uniform = ignore_ambiguous(sensor, jacobian, cov, noise)
     out.bends[at] = sensor.method == SWITCHED and bends_over(pose, mean, cov, jacobian, noise, n, m)
     if out.bends[at] or not linearised:
-        linearised = False
         weights = _expect_sigma_points(sensor, pose, mean, cov, out.predicted[at], cross, scratch)
         for a in range(2, m):
             log_uniform += _ignore_if_ambiguous(innovation[a, a], a, sensor.periods[a], noise)
-    # A constant size is unrolled by the compiler.
-    if linearised and n == 4 and m == 2:
-        project(jacobian, cov, cross, innovation, 4, 2)
-        exact = condition(cov, noise, innovation, factor, cross, posterior, 4, 2)
+        if not condition(cov, noise, innovation, factor, cross, posterior, n, m):
+            posterior_of_squares(mean, cov, factor, cross, weights, scratch, posterior)
     else:
-        if linearised:
-            project(jacobian, cov, cross, innovation, n, m)
-        exact = condition(cov, noise, innovation, factor, cross, posterior, n, m)
-    if not exact:
-        posterior_of_squares(mean, cov, factor, cross, weights, scratch, posterior)
+        condition_linear(mean, cov, factor, cross, scratch, posterior)
     out.log_norm[at] = log_norm_of_factor(factor) + log_uniform
 
 

@@ -17,24 +17,21 @@ from vedette.kernels.base.types import Floats, Sensor
 from vedette.kernels.gaussian.innovation import (
     Innovation,
     bends_over,
-    condition,
+    condition_linear,
     expect_measurement,
     ignore_ambiguous,
     log_norm_of_factor,
     make_innovation,
-    project,
     update_mean,
     whiten,
     write_posterior,
 )
-from vedette.kernels.gaussian.joseph import posterior_of_squares
 from vedette.kernels.gaussian.linalg import cholesky, solve_lower, solve_upper
 from vedette.kernels.gaussian.row_noise import has_own_noise, replace_noise
 from vedette.kernels.gaussian.scratch import Scratch, make_scratch, wrap
 from vedette.kernels.gaussian.sigma_points import (
     SWITCHED,
     UNSCENTED,
-    PointWeights,
     fill_sigma_points,
     moments_of_images,
 )
@@ -94,12 +91,8 @@ def _update(sensor: Sensor, pair: Pair, state: Floats, work: PairWork) -> float:
     part of the residual is wrapped.
     """
     innovation, scratch, n, m = work.innovation, work.scratch, pair.mean.shape[0], work.innovation.predicted.shape[1]
-    jacobian, noise, residual = scratch.measurement_jacobian, scratch.measurement_noise, scratch.residual
-    factor, cross, posterior = innovation.factor[0], innovation.whitened_cross[0], innovation.covs[0]
-    project(jacobian, pair.cov, cross, scratch.innovation_cov, n, m)
-    if not condition(pair.cov, noise, scratch.innovation_cov, factor, cross, posterior, n, m):
-        posterior_of_squares(pair.mean, pair.cov, factor, cross, PointWeights(0, 0.0, 0.0), scratch, posterior)
-    distance = 0.0
+    jacobian, residual, factor, distance = scratch.measurement_jacobian, scratch.residual, innovation.factor[0], 0.0
+    condition_linear(pair.mean, pair.cov, factor, innovation.whitened_cross[0], scratch, innovation.covs[0])
     for a in range(m):
         total = wrap(pair.measurement[a] - innovation.predicted[0, a], sensor.periods[a])
         for j in range(n):

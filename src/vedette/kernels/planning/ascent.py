@@ -43,6 +43,14 @@ class Ascent(NamedTuple):
     cell_totals: Floats  # (num_cells,) sums of log_miss
 
 
+class Gains(NamedTuple):
+    """Gains of the entries of the table with the scans of the other sensors, which stay until another one moves."""
+
+    entries: Floats  # (num_entries,) mean reward of the entry's label over that without the sensor's scans
+    changed: Ints  # (num_labels,) last line that changed the scans of each label
+    evaluated: Ints  # (num_sensors,) line of each sensor's last evaluation; -1 at the start
+
+
 class Trace(NamedTuple):
     """The evaluations of an ascent."""
 
@@ -96,33 +104,50 @@ def _is_allowed(table: Table, allowed: Allowed, chosen: Ints, sensor: int, cours
 
 
 @borrowing
-def _line(
+def _evaluate(
     table: Table,
     valuation: Valuation,
     coefficients: Floats,
-    cells: Cells,
-    prices: Floats,
     sensor: int,
-    at: Ascent,
+    totals: Floats,
     before: Floats,
     values: Floats,
     work: ValueWork,
-    gains: Floats,
+    gains: Gains,
 ) -> None:
-    """Write the gain of each course of a sensor over not scanning, with the joint rows `at` of the others."""
-    first, last = table.first_courses[sensor], table.first_courses[sensor + 1]
-    for entry in range(table.offsets[first], table.offsets[last]):
+    """Write the gains of a sensor's entries whose labels changed since the last time, with the others' joint rows."""
+    begin = table.offsets[table.first_courses[sensor]]
+    end, last = table.offsets[table.first_courses[sensor + 1]], gains.evaluated[sensor]
+    for entry in range(begin, end):
         before[table.labels[entry]] = math.inf
-    for course in range(first, last):
-        gain = _found(cells, course, at.cell_totals) - prices[course]
-        for entry in range(table.offsets[course], table.offsets[course + 1]):
-            label = table.labels[entry]
+    for entry in range(begin, end):
+        label = table.labels[entry]
+        if gains.changed[label] > last:
             if before[label] == math.inf:
-                value_rows(valuation, label, at.totals[label], work, values)
+                value_rows(valuation, label, totals[label], work, values)
                 before[label] = label_mean(values, coefficients)
-            value_changed(table, valuation, sensor, entry, at.totals[label], work, values)
-            gain += label_mean(values, coefficients) - before[label]
+            value_changed(table, valuation, sensor, entry, totals[label], work, values)
+            gains.entries[entry] = label_mean(values, coefficients) - before[label]
+
+
+@inlined
+def _sum_gains(
+    table: Table, cells: Cells, prices: Floats, sensor: int, cell_totals: Floats, entries: Floats, gains: Floats
+) -> None:
+    """Write the gain of each course of a sensor over not scanning."""
+    first = table.first_courses[sensor]
+    for course in range(first, table.first_courses[sensor + 1]):
+        gain = _found(cells, course, cell_totals) - prices[course]
+        for entry in range(table.offsets[course], table.offsets[course + 1]):
+            gain += entries[entry]
         gains[course - first] = gain
+
+
+@inlined
+def _move(table: Table, cells: Cells, sensor: int, course: int, sign: float, at: Ascent) -> None:
+    """Add the scans of a course of a sensor, or subtract them with sign -1."""
+    add_course(table, sensor, course, sign, at.totals)
+    _add_cells(cells, course, sign, at.cell_totals)
 
 
 @borrowing
@@ -152,8 +177,7 @@ def _start(
     num_labels, num_samples = len(table.start), table.changes.shape[2]
     at, price = Ascent(chosen.copy(), start_totals(table), np.zeros(len(cells.worth))), 0.0
     for s in range(len(chosen)):
-        add_course(table, s, table.first_courses[s] + chosen[s], 1.0, at.totals)
-        _add_cells(cells, table.first_courses[s] + chosen[s], 1.0, at.cell_totals)
+        _move(table, cells, s, table.first_courses[s] + chosen[s], 1.0, at)
         price += prices[table.first_courses[s] + chosen[s]]
     work, values = make_value_work(valuation, num_samples), np.empty((valuation.num, num_samples))
     reward = np.sum(cells.worth * -np.expm1(at.cell_totals)) - price
@@ -182,22 +206,28 @@ def ascend(
     at, reward = _start(table, valuation, coefficients, cells, prices, start)
     num_samples = table.changes.shape[2]
     work, values = make_value_work(valuation, num_samples), np.empty((valuation.num, num_samples))
-    before, gains = np.empty(len(table.start)), np.empty(np.max(np.diff(table.first_courses)))
+    before, sums = np.empty(len(table.start)), np.empty(np.max(np.diff(table.first_courses)))
     num_sensors, settled, sensor, line = len(start), 0, 0, 0
+    changed, evaluated = np.zeros(len(table.start), np.int64), np.full(num_sensors, -1)
+    gains = Gains(np.empty(len(table.labels)), changed, evaluated)
     evaluations, best = np.ones(max_lines + 1, np.int64), np.full(max_lines + 1, reward)
     while settled < num_sensors and line < max_lines:
         first, present = table.first_courses[sensor], at.chosen[sensor]
-        add_course(table, sensor, first + present, -1.0, at.totals)
-        _add_cells(cells, first + present, -1.0, at.cell_totals)
-        _line(table, valuation, coefficients, cells, prices, sensor, at, before, values, work, gains)
-        chosen = _best(table, allowed, at.chosen, sensor, gains, reward)
-        reward += gains[chosen] - gains[present]
+        _move(table, cells, sensor, first + present, -1.0, at)
+        _evaluate(table, valuation, coefficients, sensor, at.totals, before, values, work, gains)
+        _sum_gains(table, cells, prices, sensor, at.cell_totals, gains.entries, sums)
+        chosen = _best(table, allowed, at.chosen, sensor, sums, reward)
+        reward += sums[chosen] - sums[present]
         at.chosen[sensor] = chosen
-        add_course(table, sensor, first + chosen, 1.0, at.totals)
-        _add_cells(cells, first + chosen, 1.0, at.cell_totals)
+        _move(table, cells, sensor, first + chosen, 1.0, at)
         line += 1
+        evaluated[sensor], settled = line, settled + 1
+        if chosen != present:
+            settled = 1
+            for course in (first + present, first + chosen):
+                for entry in range(table.offsets[course], table.offsets[course + 1]):
+                    changed[table.labels[entry]] = line
         evaluations[line] = evaluations[line - 1] + table.first_courses[sensor + 1] - first - 1
         best[line] = reward
-        settled = settled + 1 if chosen == present else 1
         sensor = (sensor + 1) % num_sensors
     return at.chosen, reward, Trace(evaluations[: line + 1], best[: line + 1])

@@ -20,7 +20,6 @@ from vedette.kernels.base.compile import borrowing, inlined, kernel
 from vedette.kernels.base.types import Floats
 from vedette.kernels.gaussian.information import to_moments
 from vedette.kernels.gaussian.integrals import Integrals, integrate_rows, logs_of_one_and_integrals, make_integrals
-from vedette.kernels.gaussian.linalg import cholesky
 from vedette.kernels.planning.bernoulli_rows import normalise_powers
 
 POWER_INTEGRALS = 0
@@ -104,24 +103,26 @@ def _power_integral(valuation: Valuation, label: int, e: int, work: ValueWork, o
 
 
 @inlined
-def _position_trace(total: Floats, sample: int, prior: Floats, share: float, work: ValueWork) -> float:
-    """Return the trace of the position's covariance for the information of `prior` plus `share` times the increment."""
-    n, at = work.cov.shape[0], 0
+def _position_trace(total: Floats, sample: int, prior: Floats, share: float, cov: Floats, n: int) -> float:
+    """Return the trace of the position's covariance for the information of `prior` plus `share` times the increment.
+
+    cov: (n, n) to be written.
+    """
+    at = 0
     for i in range(n):
         for j in range(i + 1):
-            work.cov[i, j] = prior[at] + share * (total[at, sample] - prior[at])
+            cov[i, j] = prior[at] + share * (total[at, sample] - prior[at])
             at += 1
-    if not cholesky(work.cov, work.factor):
-        return math.nan
-    trace = 0.0
-    for axis in range(2):
-        for i in range(axis, n):
-            entry = 1.0 if i == axis else 0.0
-            for k in range(axis, i):
-                entry -= work.factor[i, k] * work.mean[k]
-            work.mean[i] = entry / work.factor[i, i]
-            trace += work.mean[i] * work.mean[i]
-    return trace
+    # Eliminating the rest of the state leaves the inverse of the position's covariance.
+    for k in range(n - 1, 1, -1):
+        if not cov[k, k] > 0.0:
+            return math.nan
+        for i in range(k):
+            slope = cov[k, i] / cov[k, k]
+            for j in range(i + 1):
+                cov[i, j] -= slope * cov[k, j]
+    volume = cov[0, 0] * cov[1, 1] - cov[1, 0] * cov[1, 0]
+    return (cov[0, 0] + cov[1, 1]) / volume if cov[0, 0] > 0.0 and volume > 0.0 else math.nan
 
 
 @inlined
@@ -133,8 +134,12 @@ def _expected_loss(valuation: Valuation, label: int, sample: int, work: ValueWor
     detected = -math.expm1(work.total[size - 1, sample])
     seen = unseen
     if detected > 0.0:
-        seen = min(_position_trace(work.total, sample, prior, 1.0 / detected, work), valuation.params[0])
-        seen = seen ** valuation.params[1]
+        share, n = 1.0 / detected, work.cov.shape[0]
+        if n == 4:  # a constant size is unrolled by the compiler
+            trace = _position_trace(work.total, sample, prior, share, work.cov, 4)
+        else:
+            trace = _position_trace(work.total, sample, prior, share, work.cov, n)
+        seen = min(trace, valuation.params[0]) ** valuation.params[1]
     return float(-valuation.params[2] * existence * (detected * seen + (1.0 - detected) * unseen))
 
 
