@@ -12,6 +12,7 @@ import numpy as np
 from vedette.control.additive.rewards import AdditiveRewards
 from vedette.control.contributions import Contributions, contributions_of
 from vedette.control.evaluator import Evaluator
+from vedette.control.explanation import Bound
 from vedette.control.plan import RewardTable, SearchCurve
 from vedette.control.pseudo_posterior_rewards import SampleRewards
 from vedette.errors import InputError
@@ -37,7 +38,7 @@ class Evidence:
         rewards: function that returns their sample rewards.
         shape: number of distinct courses of each of the sensors.
         keeps: whether `evaluate` keeps the rewards of all samples.
-        upper_bound_by_target: cached result of `vedette.control.problem.upper_bound_by_target`.
+        upper_limit: cached result of `vedette.control.problem.upper_limit`.
     """
 
     evaluator: Evaluator
@@ -49,7 +50,7 @@ class Evidence:
     _samples: list[tuple[Ints, Floats]] = field(default_factory=list)
     _evaluations: list[int] = field(default_factory=list)
     _best: list[float] = field(default_factory=list)
-    upper_bound_by_target: list[tuple[float, int]] = field(default_factory=list)
+    upper_limit: list[Bound] = field(default_factory=list)
     _is_complete: bool = False
 
     def __post_init__(self) -> None:

@@ -27,7 +27,7 @@ class Bound:
         upper: no joint action has a larger mean reward; inf if some target has no bound.
         reward: mean reward of the choice.
         kind: "exhaustive": every joint action was evaluated; "by target": the sum over targets of the best joint action
-            for each.
+            for each; "relaxed": by a mixture of courses of each sensor.
         unbounded: number of targets without a bound, because too many sensors may see them.
     """
 

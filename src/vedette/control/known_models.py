@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from functools import lru_cache
 
 import numpy as np
@@ -19,6 +20,7 @@ from vedette.kernels.planning.batched_models import (
     GROWING,
     POSITION,
     SAME,
+    SOFT_EDGE,
     ModelForms,
 )
 from vedette.kernels.planning.ideal import Decision, Horizon, SampledTrajectories
@@ -31,6 +33,7 @@ from vedette.models import (
     kernel_motion,
     position,
     range_dependent_noise,
+    soft_sector,
 )
 from vedette.models.detection_functions import MAX_PROB_DETECTION
 from vedette.models.functions import ModelFunction
@@ -49,7 +52,11 @@ _NOISES = {
     constant_noise([1.0]).function: CONSTANT,
 }
 
-_DETECTIONS = {gaussian_detection(1.0).function: GAUSSIAN, constant_detection(0.5).function: SAME}
+_DETECTIONS = {
+    gaussian_detection(1.0).function: GAUSSIAN,
+    constant_detection(0.5).function: SAME,
+    soft_sector(0.5, 1.0, range_slope=1.0).function: SOFT_EDGE,
+}
 
 
 def decision_of(
@@ -103,9 +110,14 @@ def forms_of(motion: Motion, sensor: Sensor, dt: float, state_dim: int, turns: b
         step[1],
         ANY if turns else _MEASUREMENTS.get(sensor.measurement, ANY),
         ANY if turns else _NOISES.get(sensor.measurement_noise_cov, ANY),
-        ANY if turns else _DETECTIONS.get(sensor.prob_detection, ANY),
+        ANY if turns else _detection_form(sensor),
         MAX_PROB_DETECTION,
     )
+
+
+def _detection_form(sensor: Sensor) -> int:
+    form, params = _DETECTIONS.get(sensor.prob_detection, ANY), sensor.detection_params
+    return ANY if form == SOFT_EDGE and (params[2] < math.pi or params[4] > 0.0) else form  # with an angular edge
 
 
 @lru_cache(maxsize=100)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
@@ -20,7 +21,7 @@ from vedette.internal.probabilities import expit
 from vedette.internal.threads import run_chunks
 from vedette.kernels.base.types import Floats, Ints
 from vedette.kernels.planning.bernoulli_rows import Table
-from vedette.kernels.planning.bounds import Choices, best_of_labels, loss_reward_bounds
+from vedette.kernels.planning.bounds import Choices, best_of_labels, relaxed_bound
 from vedette.kernels.planning.joint_values import label_values
 from vedette.kernels.planning.label_values import EXPECTED_LOSS
 
@@ -75,8 +76,8 @@ def joint_problem(evidence: Evidence, mask: Mask | None) -> JointProblem:
         return tuple(chosen.tolist())
 
     def bound() -> float:
-        target_bounds = upper_bound_by_target(evidence)
-        return np.inf if target_bounds is None else target_bounds[0]
+        found = upper_limit(evidence)
+        return np.inf if found is None else found.upper
 
     compiled = additive.coefficients is not None and allowed is not None
     return plain._replace(line=line, ascend=ascend if compiled else None, bound=bound)
@@ -126,32 +127,36 @@ _SHARE = 0.1
 def upper_bound(evidence: Evidence, choice: Sequence[int]) -> Bound | None:
     """Return an upper bound on the best mean reward, computed on the decision's samples; None if no bound is available.
 
-    If every joint action was evaluated, the bound is the best of them. Otherwise, for rewards that are sums over
-    targets, each target gets the joint action that is best for it, and each sensor finds of the undetected targets in
-    every cell what its best course there finds. No joint action can be better than that for all of them. Every sensor
-    pays its lowest price. If the number of ways to see a target exceeds `PlanningSettings.max_bound_work`, the expected
-    loss has a bound of its own (see `vedette.kernels.planning.bounds`), and other rewards have no bound for that
-    target.
+    If every joint action was evaluated, the bound is the best of them. Otherwise see `upper_limit`.
     """
     reward = evidence.mean_of(choice)
     if evidence.is_complete():
         return Bound(evidence.best, reward, "exhaustive")
-    target_bounds = upper_bound_by_target(evidence)
-    return None if target_bounds is None else Bound(target_bounds[0], reward, "by target", target_bounds[1])
+    found = upper_limit(evidence)
+    return None if found is None else replace(found, reward=reward)
 
 
-def upper_bound_by_target(evidence: Evidence) -> tuple[float, int] | None:
-    """Return an upper bound on the mean reward, and the number of targets it does not cover (cached).
+def upper_limit(evidence: Evidence) -> Bound | None:
+    """Return the upper bound without the reward of a choice (cached); None if rewards are not linear in sums of targets.
 
-    No joint action has a larger mean reward. None for rewards that are not linear in sums over targets.
+    Each target gets the joint action that is best for it, and each sensor finds of the undetected targets in every cell
+    what its best course there finds. No joint action can be better than that for all of them. Every sensor pays its
+    lowest price. If the number of ways to see a target exceeds `PlanningSettings.max_bound_work`, this bound does not
+    cover the target. The expected loss also has a bound by relaxation, usually the smaller one
+    (`vedette.kernels.planning.bounds`).
     """
-    evaluator, cached = evidence.evaluator, evidence.upper_bound_by_target
+    evaluator, cached = evidence.evaluator, evidence.upper_limit
     additive = evaluator.additive
     if not cached and additive is not None and additive.coefficients is not None:
         best = label_upper_bounds(additive, evaluator.settings.max_bound_work)
         unknown = np.isinf(best).reshape(additive.num_horizons, -1).any(axis=0)
         cheapest = np.minimum.reduceat(additive.prices, additive.table.first_courses[:-1]).sum()
-        cached.append((float(best.sum()) + _most_found(additive) - float(cheapest), int(unknown.sum())))
+        upper = float(best.sum()) + _most_found(additive) - float(cheapest)
+        cached.append(Bound(upper, -math.inf, "by target", int(unknown.sum())))
+        if additive.valuation.kind == EXPECTED_LOSS:
+            relaxed = relaxed_bound(additive.table, additive.valuation, additive.cells, additive.prices)
+            if relaxed < upper:
+                cached[0] = Bound(relaxed, -math.inf, "relaxed")
     return cached[0] if cached else None
 
 
@@ -166,17 +171,12 @@ def label_upper_bounds(additive: AdditiveRewards, max_work: int) -> Floats:
         return np.empty(0)
     choices = choices_of(table)
     num_choices = _ways(choices, len(table.start))
-    best = np.where(num_choices * additive.num_samples <= max_work, 0.0, math.nan)
+    best = np.where(num_choices * additive.num_samples <= max_work, 0.0, math.inf)
 
     def work(first: int, last: int) -> None:
         best_of_labels(table, additive.valuation, coefficients, choices, first, last, best)
 
     run_chunks(work, len(best), additive.num_threads, first_piece=32)
-    if np.isnan(best).any():
-        others = np.full(len(best), math.inf)
-        if additive.valuation.kind == EXPECTED_LOSS:
-            loss_reward_bounds(table, additive.valuation, choices, others)
-        best = np.where(np.isnan(best), others, best)
     return best
 
 

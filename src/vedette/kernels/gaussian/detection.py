@@ -38,8 +38,8 @@ def _at(
 
 
 @inlined
-def _root_of_position(cov: Floats) -> tuple[float, float, float]:
-    """Cholesky factor (a, 0; b, c) of the covariance of the position."""
+def root_of_position(cov: Floats) -> tuple[float, float, float]:
+    """Return the Cholesky factor (a, 0; b, c) of the covariance of the position."""
     a = math.sqrt(max(cov[0, 0], 0.0))
     b = cov[1, 0] / a if a > 0.0 else 0.0
     return a, b, math.sqrt(max(cov[1, 1] - b * b, 0.0))
@@ -55,7 +55,7 @@ def _over_nodes(
     stays at its mean. With a stride above 1 the sum is incomplete where P_D is the same at every stride-th node. P_D
     is 0 at nodes farther than `reach`, m, where it is not evaluated.
     """
-    nodes, total, root, square = sensor.detection_nodes, 0.0, _root_of_position(cov), reach * reach
+    nodes, total, root, square = sensor.detection_nodes, 0.0, root_of_position(cov), reach * reach
     least, most = 1.0, 0.0
     for j in range(mean.shape[0]):
         state[j] = mean[j]
@@ -116,7 +116,7 @@ def moments_if_missed(
     position. They stay as they were where P_D is 1 at every node, or the position is known. state: (state_dim,) to be
     written.
     """
-    n, nodes, root = mean.shape[0], sensor.detection_nodes, _root_of_position(cov)
+    n, nodes, root = mean.shape[0], sensor.detection_nodes, root_of_position(cov)
     for j in range(n):
         state[j] = mean[j]
     total, u, v, uu, uv, vv = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0

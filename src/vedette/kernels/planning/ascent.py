@@ -81,12 +81,6 @@ def _found(cells: Cells, course: int, totals: Floats) -> float:
 
 
 @inlined
-def _add_cells(cells: Cells, course: int, sign: float, totals: Floats) -> None:
-    for entry in range(cells.offsets[course], cells.offsets[course + 1]):
-        totals[cells.cells[entry]] += sign * cells.log_miss[entry]
-
-
-@inlined
 def _is_allowed(table: Table, allowed: Allowed, chosen: Ints, sensor: int, course: int) -> bool:
     if not allowed.single[course]:
         return False
@@ -144,10 +138,11 @@ def _sum_gains(
 
 
 @inlined
-def _move(table: Table, cells: Cells, sensor: int, course: int, sign: float, at: Ascent) -> None:
-    """Add the scans of a course of a sensor, or subtract them with sign -1."""
-    add_course(table, sensor, course, sign, at.totals)
-    _add_cells(cells, course, sign, at.cell_totals)
+def add_scans(table: Table, cells: Cells, sensor: int, course: int, share: float, at: Ascent) -> None:
+    """Add a share of the scans of a course of a sensor, or subtract them with share -1."""
+    add_course(table, sensor, course, share, at.totals)
+    for entry in range(cells.offsets[course], cells.offsets[course + 1]):
+        at.cell_totals[cells.cells[entry]] += share * cells.log_miss[entry]
 
 
 @borrowing
@@ -177,7 +172,7 @@ def _start(
     num_labels, num_samples = len(table.start), table.changes.shape[2]
     at, price = Ascent(chosen.copy(), start_totals(table), np.zeros(len(cells.worth))), 0.0
     for s in range(len(chosen)):
-        _move(table, cells, s, table.first_courses[s] + chosen[s], 1.0, at)
+        add_scans(table, cells, s, table.first_courses[s] + chosen[s], 1.0, at)
         price += prices[table.first_courses[s] + chosen[s]]
     work, values = make_value_work(valuation, num_samples), np.empty((valuation.num, num_samples))
     reward = np.sum(cells.worth * -np.expm1(at.cell_totals)) - price
@@ -213,13 +208,13 @@ def ascend(
     evaluations, best = np.ones(max_lines + 1, np.int64), np.full(max_lines + 1, reward)
     while settled < num_sensors and line < max_lines:
         first, present = table.first_courses[sensor], at.chosen[sensor]
-        _move(table, cells, sensor, first + present, -1.0, at)
+        add_scans(table, cells, sensor, first + present, -1.0, at)
         _evaluate(table, valuation, coefficients, sensor, at.totals, before, values, work, gains)
         _sum_gains(table, cells, prices, sensor, at.cell_totals, gains.entries, sums)
         chosen = _best(table, allowed, at.chosen, sensor, sums, reward)
         reward += sums[chosen] - sums[present]
         at.chosen[sensor] = chosen
-        _move(table, cells, sensor, first + chosen, 1.0, at)
+        add_scans(table, cells, sensor, first + chosen, 1.0, at)
         line += 1
         evaluated[sensor], settled = line, settled + 1
         if chosen != present:

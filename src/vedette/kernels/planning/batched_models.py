@@ -15,14 +15,14 @@ import numpy as np
 from vedette.kernels.base.compile import borrowing, inlined, kernel
 from vedette.kernels.base.elementary import Bits, directions, exponentials, make_bits
 from vedette.kernels.base.types import Floats, Sensor
-from vedette.kernels.gaussian.detection import AT_CENTRE, checked, detection_probability
+from vedette.kernels.gaussian.detection import AT_CENTRE, checked, detection_probability, root_of_position
 from vedette.kernels.gaussian.scratch import Scratch
 
 ANY = 0  # a function of one state
 
 BEARING_RANGE, POSITION = 1, 2  # measurements
 GROWING, CONSTANT = 1, 2  # noise: of bearing and range, growing with the distance; constant and independent
-GAUSSIAN, SAME = 1, 2  # detection: decreasing with the distance, as exp(-d^2 / (2 sigma^2)); constant
+GAUSSIAN, SAME, SOFT_EDGE = 1, 2, 3  # detection: exp(-d^2 / (2 sigma^2)) at a distance d; constant; logistic in d
 
 
 class ModelForms(NamedTuple):
@@ -78,12 +78,18 @@ def take_matrix(lower: Floats, s: int, out: Floats) -> None:
 @borrowing
 def find_offsets(pose: Floats, states: Floats, num: int, out: Offsets) -> None:
     """Write the offsets of the first `num` states (state_dim, room) from the pose."""
-    x, y, dx, dy, squares, distances = states[0], states[1], out.dx, out.dy, out.squares, out.distances
-    px, py = pose[0], pose[1]
+    x, y, dx, dy, px, py = states[0], states[1], out.dx, out.dy, pose[0], pose[1]
     for s in range(num):
         dx[s] = x[s] - px
     for s in range(num):
         dy[s] = y[s] - py
+    measure_offsets(out, num)
+
+
+@inlined
+def measure_offsets(out: Offsets, num: int) -> None:
+    """Write squares and distances of the first `num` offsets."""
+    dx, dy, squares, distances = out.dx, out.dy, out.squares, out.distances
     for s in range(num):
         squares[s] = dx[s] * dx[s] + dy[s] * dy[s]
     for s in range(num):
@@ -189,17 +195,61 @@ def fill_noise(
 
 @inlined
 def _detect_by_form(sensor: Sensor, forms: ModelForms, offsets: Offsets, num: int, out: Floats) -> None:
+    # Beyond the largest exponent the result is that of the limit, up to 1e-304.
     if forms.detection == SAME:
         for s in range(num):
             out[s] = sensor.detection_params[0]
-        return
-    spread = sensor.detection_params[0] * sensor.detection_params[0]
-    for s in range(num):
-        # Below the least exponent the result is 0, up to 1e-304.
-        out[s] = max(-0.5 * offsets.squares[s] / spread, -700.0)
-    exponentials(out[:num], offsets.bits)
-    for s in range(num):
-        out[s] = min(out[s], forms.most_detection)
+    elif forms.detection == GAUSSIAN:
+        spread = sensor.detection_params[0] * sensor.detection_params[0]
+        for s in range(num):
+            out[s] = max(-0.5 * offsets.squares[s] / spread, -700.0)
+        exponentials(out[:num], offsets.bits)
+        for s in range(num):
+            out[s] = min(out[s], forms.most_detection)
+    else:
+        most, edge, slope = sensor.detection_params[0], sensor.detection_params[1], sensor.detection_params[3]
+        for s in range(num):
+            out[s] = max(min(slope * (offsets.distances[s] - edge), 700.0), -700.0)
+        exponentials(out[:num], offsets.bits)
+        cut = edge if sensor.detection_params[5] > 0.0 else math.inf
+        for s in range(num):
+            out[s] = most * (1.0 / (1.0 + out[s])) if offsets.distances[s] <= cut else 0.0
+
+
+@borrowing
+def mean_detection_by_form(
+    sensor: Sensor,
+    forms: ModelForms,
+    pose: Floats,
+    mean: Floats,
+    cov: Floats,
+    reach: float,
+    offsets: Offsets,
+    work: Floats,
+) -> float:
+    """Return the detection probability of a Gaussian by the nodes within `reach`, m, see `detection_within`.
+
+    work: (2, num_nodes) to be written, as the offsets.
+    """
+    nodes, root, dx, dy, squares = sensor.detection_nodes, root_of_position(cov), offsets.dx, offsets.dy, offsets.squares
+    x, y, px, py, limit, weights, num, total = mean[0], mean[1], pose[0], pose[1], reach * reach, work[0], 0, 0.0
+    for i in range(len(nodes)):
+        dx[i] = x + root[0] * nodes[i, 1] - px
+    for i in range(len(nodes)):
+        dy[i] = y + root[1] * nodes[i, 1] + root[2] * nodes[i, 2] - py
+    for i in range(len(nodes)):
+        squares[i] = dx[i] * dx[i] + dy[i] * dy[i]
+    for i in range(len(nodes)):
+        if squares[i] <= limit:
+            weights[num], dx[num], dy[num] = nodes[i, 0], dx[i], dy[i]
+            num += 1
+    if num == 0:
+        return 0.0
+    measure_offsets(offsets, num)
+    _detect_by_form(sensor, forms, offsets, num, work[1])
+    for i in range(num):
+        total += weights[i] * work[1, i]
+    return min(total, 1.0)  # weights sum to 1 but for rounding
 
 
 @borrowing

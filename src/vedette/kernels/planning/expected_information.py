@@ -14,13 +14,14 @@ import numpy as np
 from vedette.errors import NumericalError
 from vedette.kernels.base.compile import borrowing, inlined, kernel
 from vedette.kernels.base.types import Floats, Sensor
-from vedette.kernels.gaussian.detection import detection_within
+from vedette.kernels.gaussian.detection import BY_NODES, detection_within
 from vedette.kernels.gaussian.innovation import Innovation, expect_measurement, make_innovation
 from vedette.kernels.gaussian.linalg import cholesky, inverse_from_factor
 from vedette.kernels.gaussian.prediction import predict
 from vedette.kernels.gaussian.relinearisation import Pair, PairWork, learn_at_mean
 from vedette.kernels.gaussian.scratch import Scratch, make_scratch
 from vedette.kernels.gaussian.sigma_points import LINEARISED, SWITCHED
+from vedette.kernels.planning.batched_models import ANY, Offsets, make_offsets, mean_detection_by_form
 from vedette.kernels.planning.bernoulli_rows import log_miss
 from vedette.kernels.planning.ideal import Decision
 from vedette.kernels.planning.known_association import Entries
@@ -38,10 +39,12 @@ class _Work(NamedTuple):
     cov: Floats  # (state_dim, state_dim)
     factor: Floats  # (state_dim, state_dim)
     inverse: Floats  # (state_dim, state_dim)
+    offsets: Offsets  # of the nodes of the detection probability
+    of_nodes: Floats  # (2, num_nodes)
 
 
 @kernel
-def _make_work(dim: int, meas_dim: int) -> _Work:
+def _make_work(dim: int, meas_dim: int, num_nodes: int) -> _Work:
     return _Work(
         make_scratch(dim, meas_dim),
         make_innovation(1, dim, meas_dim),
@@ -51,6 +54,8 @@ def _make_work(dim: int, meas_dim: int) -> _Work:
         np.empty((dim, dim)),
         np.empty((dim, dim)),
         np.empty((dim, dim)),
+        make_offsets(num_nodes),
+        np.empty((2, num_nodes)),
     )
 
 
@@ -99,11 +104,17 @@ def _is_seen(
 ) -> bool:
     """Return True if a label's detection probability is at least `least` at some step; writes the probabilities."""
     paths, seen = belief.paths, False
+    by_form = decision.forms.detection != ANY and decision.sensor.detection_rule == BY_NODES
     for h in range(len(detections)):
         pose, state, detections[h] = decision.horizon.poses[course, h], work.scratch.points[0], 0.0
         if not is_beyond(belief.paths, belief.radii, decision.horizon, course, label, h, reach):
             mean, cov = paths.means[label, h], paths.covs[label, h]
-            detections[h] = detection_within(decision.sensor, pose, mean, cov, state, reach)
+            if by_form:
+                detections[h] = mean_detection_by_form(
+                    decision.sensor, decision.forms, pose, mean, cov, reach, work.offsets, work.of_nodes
+                )
+            else:
+                detections[h] = detection_within(decision.sensor, pose, mean, cov, state, reach)
             seen |= detections[h] >= least
     return seen
 
@@ -162,7 +173,7 @@ def fill_expected_changes(
     P_D is that of the prediction, even if earlier scans of the horizon are expected to have reduced its covariance.
     """
     dim, size = belief.paths.means.shape[2], bases.shape[1]
-    work = _make_work(dim, len(decision.sensor.periods))
+    work = _make_work(dim, len(decision.sensor.periods), len(decision.sensor.detection_nodes))
     cov, information, detections = np.empty((dim, dim)), np.empty((dim, dim)), np.empty(belief.paths.means.shape[1])
     for course in range(first, last):
         for entry in range(entries.first[course], entries.last[course]):

@@ -38,12 +38,12 @@ def spread_row(row: Floats, out: Floats) -> None:
 
 
 @borrowing
-def add_course(table: Table, sensor: int, course: int, sign: float, totals: Floats) -> None:
-    """Add the changes of a course, or subtract them with sign -1.
+def add_course(table: Table, sensor: int, course: int, share: float, totals: Floats) -> None:
+    """Add a share of the changes of a course, or subtract them with share -1.
 
     totals: (num_labels, bernoulli_size, num_samples), changed in place.
     """
-    power = sign * table.powers[sensor]
+    power = share * table.powers[sensor]
     for entry in range(table.offsets[course], table.offsets[course + 1]):
         total = totals[table.labels[entry]]
         add_rows(total, power, table.changes[entry], total)

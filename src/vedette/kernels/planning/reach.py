@@ -74,8 +74,9 @@ def is_beyond(paths: Paths, radii: Floats, horizon: Horizon, course: int, label:
     """Return True if, at a step of a course, a label is beyond the sensor's reach, or the sensor does not scan."""
     if not horizon.scans[course, step]:
         return True
-    pose, mean = horizon.poses[course, step], paths.means[label, step]
-    return math.hypot(mean[0] - pose[0], mean[1] - pose[1]) > reach + radii[label, step]
+    pose, mean, most = horizon.poses[course, step], paths.means[label, step], reach + radii[label, step]
+    dx, dy = mean[0] - pose[0], mean[1] - pose[1]
+    return dx * dx + dy * dy > most * most
 
 
 @borrowing
