@@ -28,7 +28,7 @@ from vedette.control.evaluator import mean_over_horizons
 from vedette.control.evidence import Evidence
 from vedette.control.extrapolation import extrapolated
 from vedette.control.inputs import options_of
-from vedette.control.problem import label_upper_bounds, upper_bound
+from vedette.control.problem import upper_bound
 from vedette.control.search import all_joint_actions
 from vedette.densities import LMB, UndetectedIntensity
 from vedette.filters import LmbFilter
@@ -286,10 +286,8 @@ def test_the_bound_stays_one(hidden: bool) -> None:
         evidence.evaluate(np.array([[0, 0, 0]]))
         bound = upper_bound(evidence, (0, 0, 0))
         assert bound is not None
-        assert (bound.kind, bound.unbounded) == ("by target", 0)
+        assert bound.unbounded == 0
         assert every.max() <= bound.upper + 1e-9
-        tried, untried = (label_upper_bounds(sums_of(evaluator), work) for work in (10**6, 0))
-        assert (tried <= untried + 1e-9).all()
 
 
 # plans

@@ -29,6 +29,7 @@ def test_the_lead_over_the_runner_up(margin: float, error: float | None, words: 
     [
         (Bound(4.0, 4.0, "exhaustive"), "yes"),
         (Bound(5.0, 4.0, "by target"), "within 20 %"),
+        (Bound(5.1, 4.0, "relaxed"), "not known"),
         (Bound(math.inf, 4.0, "by target", 2), "not known"),
         (None, ""),
     ],

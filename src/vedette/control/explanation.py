@@ -19,6 +19,10 @@ _MOST_ROWS = 10
 _SAME = 1e-9
 
 
+# Largest relative gap of a bound that is printed.
+_CLOSE = 0.2
+
+
 @dataclass(frozen=True, slots=True)
 class Bound:
     """Upper bound on the reward of the best joint action, on the same samples.
@@ -42,6 +46,11 @@ class Bound:
         return self.upper - self.reward
 
     @property
+    def is_close(self) -> bool:
+        """Whether the gap is at most a fifth of the reward; texts and tables leave out looser bounds."""
+        return self.relative <= _CLOSE
+
+    @property
     def relative(self) -> float:
         """The gap relative to the magnitude of the bound or of the reward, whichever is larger; 0 for no gap."""
         scale = max(abs(self.upper), abs(self.reward))
@@ -52,7 +61,7 @@ class Bound:
             return "the best of all joint actions"
         if self.unbounded:
             return f"no bound: {self.unbounded} targets may be seen in too many ways"
-        return f"at most {self.gap:.4g} ({100.0 * self.relative:.2g} %) below the best"
+        return f"at most {self.gap:.4g} ({100.0 * self.relative:.2g} %) below the best" if self.is_close else ""
 
 
 class TargetGains(NamedTuple):
@@ -222,8 +231,8 @@ def _of_choice(explanation: Explanation) -> list[str]:
         else f"; {number_text(explanation.baseline, explanation.reward)} without any scan"
     )
     lines = [f"{explanation.planner}: reward {with_error(explanation.reward, explanation.standard_error)}{start}"]
-    bound = "" if explanation.bound is None else f"; {explanation.bound}"
-    lines.append(f"{pluralise(explanation.evaluations, 'choice')} evaluated{bound}")
+    bound = str(explanation.bound or "")
+    lines.append("; ".join(filter(None, [f"{pluralise(explanation.evaluations, 'choice')} evaluated", bound])))
     if explanation.runner_up is not None:
         lines.append(
             f"runner-up: {margin_text(explanation.runner_up, explanation.reward)}: {explanation.runner_up.text}"

@@ -137,7 +137,7 @@ def upper_bound(evidence: Evidence, choice: Sequence[int]) -> Bound | None:
 
 
 def upper_limit(evidence: Evidence) -> Bound | None:
-    """Return the upper bound without the reward of a choice (cached); None if rewards are not linear in sums of targets.
+    """Return the upper bound without a choice's reward (cached); None if rewards are not linear in sums of targets.
 
     Each target gets the joint action that is best for it, and each sensor finds of the undetected targets in every cell
     what its best course there finds. No joint action can be better than that for all of them. Every sensor pays its

@@ -23,6 +23,6 @@ def optimality_words(plan: Plan) -> str:
     bound = None if plan.explanation is None else plan.explanation.bound
     if bound is None:
         return ""
-    if not math.isfinite(bound.upper):
-        return "not known"
-    return "yes" if bound.gap <= 0.0 else f"within {100.0 * bound.relative:.2g} %"
+    if bound.gap <= 0.0:
+        return "yes"
+    return f"within {100.0 * bound.relative:.2g} %" if bound.is_close else "not known"

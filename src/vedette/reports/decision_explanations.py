@@ -46,8 +46,8 @@ def _facts(plan: Plan, explanation: Explanation, reward: float, names: Sequence[
         margin = margin_text(explanation.runner_up, reward, "±", (", ", ""))
         facts.append(("Second best", f"{margin}: {_others(plan, explanation.runner_up, names)}"))
     facts.append(("Evaluated", pluralise(explanation.evaluations, "choice")))
-    if explanation.bound is not None:
-        facts.append(("Bound", str(explanation.bound)))
+    if bound := str(explanation.bound or ""):
+        facts.append(("Bound", bound))
     reasons: dict[str, list[str]] = {}
     for name, reason in explanation.missing.items():
         if name in _WORDS:

@@ -47,25 +47,20 @@ def root_of_position(cov: Floats) -> tuple[float, float, float]:
 
 @inlined
 def _over_nodes(
-    sensor: Sensor, pose: Floats, mean: Floats, cov: Floats, state: Floats, stride: int, reach: float
+    sensor: Sensor, pose: Floats, mean: Floats, cov: Floats, state: Floats, stride: int
 ) -> tuple[float, float]:
     """Mean of P_D over a Gaussian, and the largest difference of P_D between its nodes.
 
     The sum of weight * P_D at mean + L (standard deviates), L L' the covariance of the position; the rest of the state
-    stays at its mean. With a stride above 1 the sum is incomplete where P_D is the same at every stride-th node. P_D
-    is 0 at nodes farther than `reach`, m, where it is not evaluated.
+    stays at its mean. With a stride above 1 the sum is incomplete where P_D is the same at every stride-th node.
     """
-    nodes, total, root, square = sensor.detection_nodes, 0.0, root_of_position(cov), reach * reach
+    nodes, total, root = sensor.detection_nodes, 0.0, root_of_position(cov)
     least, most = 1.0, 0.0
     for j in range(mean.shape[0]):
         state[j] = mean[j]
     for first in range(stride):
         for i in range(first, nodes.shape[0], stride):
-            dx = mean[0] + root[0] * nodes[i, 1] - pose[0]
-            dy = mean[1] + root[1] * nodes[i, 1] + root[2] * nodes[i, 2] - pose[1]
-            found = 0.0
-            if dx * dx + dy * dy <= square:
-                found = _at(sensor, pose, mean, root, nodes[i, 1], nodes[i, 2], state)
+            found = _at(sensor, pose, mean, root, nodes[i, 1], nodes[i, 2], state)
             total += nodes[i, 0] * found
             least, most = min(least, found), max(most, found)
         if most - least <= _LEAST_DIFFERENCE:
@@ -84,9 +79,9 @@ def detection_and_edge(sensor: Sensor, pose: Floats, mean: Floats, cov: Floats, 
     if sensor.detection_rule == CLOSED_FORM:
         return checked(sensor.mean_prob_detection(mean, cov, pose, sensor.detection_params)), False
     if sensor.detection_rule == BY_NODES:
-        return _over_nodes(sensor, pose, mean, cov, state, 1, math.inf)[0], False
+        return _over_nodes(sensor, pose, mean, cov, state, 1)[0], False
     if sensor.detection_rule == AT_EDGES:
-        found, difference = _over_nodes(sensor, pose, mean, cov, state, _STRIDE, math.inf)
+        found, difference = _over_nodes(sensor, pose, mean, cov, state, _STRIDE)
         if difference > _LEAST_DIFFERENCE:
             return found, True
     return checked(sensor.prob_detection(mean, pose, sensor.detection_params)), False
@@ -96,14 +91,6 @@ def detection_and_edge(sensor: Sensor, pose: Floats, mean: Floats, cov: Floats, 
 def detection_probability(sensor: Sensor, pose: Floats, mean: Floats, cov: Floats, state: Floats) -> float:
     """Return the detection probability of a Gaussian, see `detection_and_edge`."""
     return detection_and_edge(sensor, pose, mean, cov, state)[0]
-
-
-@inlined
-def detection_within(sensor: Sensor, pose: Floats, mean: Floats, cov: Floats, state: Floats, reach: float) -> float:
-    """Return the detection probability of a Gaussian for a sensor whose P_D is 0 farther than `reach`, m."""
-    if sensor.detection_rule == BY_NODES:
-        return _over_nodes(sensor, pose, mean, cov, state, 1, reach)[0]
-    return detection_probability(sensor, pose, mean, cov, state)
 
 
 @inlined

@@ -43,12 +43,12 @@ class Ascent(NamedTuple):
     cell_totals: Floats  # (num_cells,) sums of log_miss
 
 
-class Gains(NamedTuple):
-    """Gains of the entries of the table with the scans of the other sensors, which stay until another one moves."""
+class Known(NamedTuple):
+    """Gains of labels on the courses of each sensor, which hold until another sensor's scans of the label change."""
 
-    entries: Floats  # (num_entries,) mean reward of the entry's label over that without the sensor's scans
+    gains: Floats  # (num_entries,)
     changed: Ints  # (num_labels,) last line that changed the scans of each label
-    evaluated: Ints  # (num_sensors,) line of each sensor's last evaluation; -1 at the start
+    lines: Ints  # (num_sensors,) last line of each sensor; -1 at the start
 
 
 class Trace(NamedTuple):
@@ -98,42 +98,35 @@ def _is_allowed(table: Table, allowed: Allowed, chosen: Ints, sensor: int, cours
 
 
 @borrowing
-def _evaluate(
+def _line(
     table: Table,
     valuation: Valuation,
     coefficients: Floats,
+    cells: Cells,
+    prices: Floats,
     sensor: int,
-    totals: Floats,
+    at: Ascent,
     before: Floats,
     values: Floats,
     work: ValueWork,
-    gains: Gains,
+    known: Known,
+    gains: Floats,
 ) -> None:
-    """Write the gains of a sensor's entries whose labels changed since the last time, with the others' joint rows."""
-    begin = table.offsets[table.first_courses[sensor]]
-    end, last = table.offsets[table.first_courses[sensor + 1]], gains.evaluated[sensor]
-    for entry in range(begin, end):
+    """Write the gain of each course of a sensor over not scanning, with the joint rows `at` of the others."""
+    first, last, line = table.first_courses[sensor], table.first_courses[sensor + 1], known.lines[sensor]
+    for entry in range(table.offsets[first], table.offsets[last]):
         before[table.labels[entry]] = math.inf
-    for entry in range(begin, end):
-        label = table.labels[entry]
-        if gains.changed[label] > last:
-            if before[label] == math.inf:
-                value_rows(valuation, label, totals[label], work, values)
-                before[label] = label_mean(values, coefficients)
-            value_changed(table, valuation, sensor, entry, totals[label], work, values)
-            gains.entries[entry] = label_mean(values, coefficients) - before[label]
-
-
-@inlined
-def _sum_gains(
-    table: Table, cells: Cells, prices: Floats, sensor: int, cell_totals: Floats, entries: Floats, gains: Floats
-) -> None:
-    """Write the gain of each course of a sensor over not scanning."""
-    first = table.first_courses[sensor]
-    for course in range(first, table.first_courses[sensor + 1]):
-        gain = _found(cells, course, cell_totals) - prices[course]
+    for course in range(first, last):
+        gain = _found(cells, course, at.cell_totals) - prices[course]
         for entry in range(table.offsets[course], table.offsets[course + 1]):
-            gain += entries[entry]
+            label = table.labels[entry]
+            if known.changed[label] > line:
+                if before[label] == math.inf:
+                    value_rows(valuation, label, at.totals[label], work, values)
+                    before[label] = label_mean(values, coefficients)
+                value_changed(table, valuation, sensor, entry, at.totals[label], work, values)
+                known.gains[entry] = label_mean(values, coefficients) - before[label]
+            gain += known.gains[entry]
         gains[course - first] = gain
 
 
@@ -201,27 +194,23 @@ def ascend(
     at, reward = _start(table, valuation, coefficients, cells, prices, start)
     num_samples = table.changes.shape[2]
     work, values = make_value_work(valuation, num_samples), np.empty((valuation.num, num_samples))
-    before, sums = np.empty(len(table.start)), np.empty(np.max(np.diff(table.first_courses)))
+    before, gains = np.empty(len(table.start)), np.empty(np.max(np.diff(table.first_courses)))
     num_sensors, settled, sensor, line = len(start), 0, 0, 0
-    changed, evaluated = np.zeros(len(table.start), np.int64), np.full(num_sensors, -1)
-    gains = Gains(np.empty(len(table.labels)), changed, evaluated)
+    known = Known(np.empty(len(table.labels)), np.zeros(len(table.start), np.int64), np.full(num_sensors, -1))
     evaluations, best = np.ones(max_lines + 1, np.int64), np.full(max_lines + 1, reward)
     while settled < num_sensors and line < max_lines:
         first, present = table.first_courses[sensor], at.chosen[sensor]
         add_scans(table, cells, sensor, first + present, -1.0, at)
-        _evaluate(table, valuation, coefficients, sensor, at.totals, before, values, work, gains)
-        _sum_gains(table, cells, prices, sensor, at.cell_totals, gains.entries, sums)
-        chosen = _best(table, allowed, at.chosen, sensor, sums, reward)
-        reward += sums[chosen] - sums[present]
+        _line(table, valuation, coefficients, cells, prices, sensor, at, before, values, work, known, gains)
+        chosen = _best(table, allowed, at.chosen, sensor, gains, reward)
+        reward += gains[chosen] - gains[present]
         at.chosen[sensor] = chosen
         add_scans(table, cells, sensor, first + chosen, 1.0, at)
         line += 1
-        evaluated[sensor], settled = line, settled + 1
-        if chosen != present:
-            settled = 1
-            for course in (first + present, first + chosen):
-                for entry in range(table.offsets[course], table.offsets[course + 1]):
-                    changed[table.labels[entry]] = line
+        known.lines[sensor], settled = line, settled + 1 if chosen == present else 1
+        for course in (first + present, first + chosen):
+            if chosen != present:
+                known.changed[table.labels[table.offsets[course] : table.offsets[course + 1]]] = line
         evaluations[line] = evaluations[line - 1] + table.first_courses[sensor + 1] - first - 1
         best[line] = reward
         sensor = (sensor + 1) % num_sensors

@@ -15,7 +15,7 @@ import numpy as np
 from vedette.kernels.base.compile import borrowing, inlined, kernel
 from vedette.kernels.base.elementary import Bits, directions, exponentials, make_bits
 from vedette.kernels.base.types import Floats, Sensor
-from vedette.kernels.gaussian.detection import AT_CENTRE, checked, detection_probability, root_of_position
+from vedette.kernels.gaussian.detection import AT_CENTRE, checked, detection_probability
 from vedette.kernels.gaussian.scratch import Scratch
 
 ANY = 0  # a function of one state
@@ -78,18 +78,12 @@ def take_matrix(lower: Floats, s: int, out: Floats) -> None:
 @borrowing
 def find_offsets(pose: Floats, states: Floats, num: int, out: Offsets) -> None:
     """Write the offsets of the first `num` states (state_dim, room) from the pose."""
-    x, y, dx, dy, px, py = states[0], states[1], out.dx, out.dy, pose[0], pose[1]
+    x, y, dx, dy, squares, distances = states[0], states[1], out.dx, out.dy, out.squares, out.distances
+    px, py = pose[0], pose[1]
     for s in range(num):
         dx[s] = x[s] - px
     for s in range(num):
         dy[s] = y[s] - py
-    measure_offsets(out, num)
-
-
-@inlined
-def measure_offsets(out: Offsets, num: int) -> None:
-    """Write squares and distances of the first `num` offsets."""
-    dx, dy, squares, distances = out.dx, out.dy, out.squares, out.distances
     for s in range(num):
         squares[s] = dx[s] * dx[s] + dy[s] * dy[s]
     for s in range(num):
@@ -217,42 +211,6 @@ def _detect_by_form(sensor: Sensor, forms: ModelForms, offsets: Offsets, num: in
 
 
 @borrowing
-def mean_detection_by_form(
-    sensor: Sensor,
-    forms: ModelForms,
-    pose: Floats,
-    mean: Floats,
-    cov: Floats,
-    reach: float,
-    offsets: Offsets,
-    work: Floats,
-) -> float:
-    """Return the detection probability of a Gaussian by the nodes within `reach`, m, see `detection_within`.
-
-    work: (2, num_nodes) to be written, as the offsets.
-    """
-    nodes, root, dx, dy, squares = sensor.detection_nodes, root_of_position(cov), offsets.dx, offsets.dy, offsets.squares
-    x, y, px, py, limit, weights, num, total = mean[0], mean[1], pose[0], pose[1], reach * reach, work[0], 0, 0.0
-    for i in range(len(nodes)):
-        dx[i] = x + root[0] * nodes[i, 1] - px
-    for i in range(len(nodes)):
-        dy[i] = y + root[1] * nodes[i, 1] + root[2] * nodes[i, 2] - py
-    for i in range(len(nodes)):
-        squares[i] = dx[i] * dx[i] + dy[i] * dy[i]
-    for i in range(len(nodes)):
-        if squares[i] <= limit:
-            weights[num], dx[num], dy[num] = nodes[i, 0], dx[i], dy[i]
-            num += 1
-    if num == 0:
-        return 0.0
-    measure_offsets(offsets, num)
-    _detect_by_form(sensor, forms, offsets, num, work[1])
-    for i in range(num):
-        total += weights[i] * work[1, i]
-    return min(total, 1.0)  # weights sum to 1 but for rounding
-
-
-@borrowing
 def fill_detection(
     sensor: Sensor,
     forms: ModelForms,
@@ -270,7 +228,7 @@ def fill_detection(
     state = scratch.points[0]
     for s in range(num):
         take_state(states, s, state)
-        out[s] = sensor.prob_detection(state, pose, sensor.detection_params)
+        out[s] = checked(sensor.prob_detection(state, pose, sensor.detection_params))
 
 
 @borrowing

@@ -19,7 +19,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from vedette.kernels.base.compile import borrowing, inlined, kernel
+from vedette.kernels.base.compile import borrowing, kernel
 from vedette.kernels.base.types import Floats, Ints
 from vedette.kernels.gaussian.linalg import cholesky, inverse_from_factor
 from vedette.kernels.planning.ascent import Ascent, Cells, add_scans, label_mean
@@ -31,16 +31,10 @@ from vedette.kernels.planning.joint_values import (
     value_rows,
     values_without_scans,
 )
-from vedette.kernels.planning.label_values import Valuation, make_value_work
+from vedette.kernels.planning.label_values import Valuation, ValueWork, make_value_work
 
 # Tangents that are tried: 40 instead of 20 lower the bound by less than half a per cent of the loss.
 _NUM_TANGENTS = 20
-
-# Halvings of the interval that contains the end of the straight line.
-_NUM_HALVINGS = 10
-
-# Relative rounding error of information.
-_SAME = 1e-9
 
 
 class Choices(NamedTuple):
@@ -90,105 +84,67 @@ def best_of_labels(
         out[label] = best
 
 
-class _Work(NamedTuple):
-    """Working arrays of the tangent of one label."""
-
-    information: Floats  # (state_dim, state_dim)
-    factor: Floats  # (state_dim, state_dim)
-    cov: Floats  # (state_dim, state_dim)
-
-
-@borrowing
-def _end_of_line(valuation: Valuation, start: Floats, label: int) -> float:
-    """Return the 1 / tr P at which the straight line from the cutoff meets the loss as a tangent.
-
-    The line begins at the prediction, if `start` has no other information, else at 0. Slightly later ends are valid.
-    """
-    square, half, prior = valuation.params[0], valuation.params[1], valuation.prior[label]
-    begin = 1.0 / (valuation.covs[label, 0, 0] + valuation.covs[label, 1, 1])
-    dim = valuation.covs.shape[1]
-    for k in range(dim * (dim + 1) // 2):
-        if abs(start[k] - start[len(start) - 3] * prior[k]) > _SAME * abs(prior[k]):
-            begin = 0.0
-    if begin * square >= 1.0:
-        return begin
-    low, high = max(begin, 1.0 / square), (1.0 + half) ** (1.0 / half) / square
-    for _ in range(_NUM_HALVINGS):
-        middle = 0.5 * (low + high)
-        if middle**-half * (1.0 + half - half * begin / middle) > square**half:
-            low = middle
-        else:
-            high = middle
-    return high
-
-
 @borrowing
 def _tangent(
-    valuation: Valuation, start: Floats, label: int, unseen: float, end: float, total: Floats, work: _Work, out: Floats
+    valuation: Valuation, label: int, unseen: float, start: Floats, total: Floats, work: ValueWork, slopes: Floats
 ) -> float:
-    """Write the slopes (bernoulli_size,) of a label's term in its sums, at `total` (bernoulli_size, 1); returns the tangent at `start`.
+    """Write the slopes (bernoulli_size,) of a label's term in its sums; returns the value of the tangent at `start`.
 
-    unseen: the label's term without scans. end: see `_end_of_line`. inf if the arithmetic fails.
+    unseen: the term without scans. total: (bernoulli_size, 1) where it is touched. inf if the arithmetic fails.
     """
-    n, last, prior, half, at = work.cov.shape[0], len(out) - 1, valuation.prior[label], valuation.params[1], 0
-    out[:] = 0.0
+    cov, last, prior, half, at = work.cov, len(slopes) - 1, valuation.prior[label], valuation.params[1], 0
+    slopes[:] = 0.0
     detected, power = -math.expm1(total[last, 0]), start[last - 2]
     if not (detected > 0.0 and power > 0.0):
         return unseen
-    for i in range(n):
+    for i in range(len(cov)):
         for j in range(i + 1):
-            work.information[i, j] = prior[at] + (total[at, 0] / power - prior[at]) / detected
+            cov[i, j] = prior[at] + (total[at, 0] / power - prior[at]) / detected
             at += 1
-    if not cholesky(work.information, work.factor):
+    if not cholesky(cov, work.factor):
         return math.inf
-    inverse_from_factor(work.factor, work.cov)
-    inverse = 1.0 / (work.cov[0, 0] + work.cov[1, 1])
-    touched = max(inverse, end)
-    slope = -half * touched ** (-half - 1.0)
-    weight = -valuation.params[2] / (1.0 + math.exp(-prior[last - 1]))
-    seen, change, gained, at = weight * (touched**-half + slope * (inverse - touched)), 0.0, 0.0, 0
-    for i in range(n):
+    inverse_from_factor(work.factor, cov)
+    # Up to `end` the straight line that begins at 1 / tr P = 0 with the cutoff, and ends as a tangent.
+    inverse, end = 1.0 / (cov[0, 0] + cov[1, 1]), (1.0 + half) ** (1.0 / half) / valuation.params[0]
+    near, weight = max(inverse, end), -valuation.params[2] / (1.0 + math.exp(-prior[last - 1]))
+    slope = -half * weight * near ** (-half - 1.0)
+    seen, change, gained, at = weight * near**-half + slope * (inverse - near), 0.0, 0.0, 0
+    for i in range(len(cov)):
         for j in range(i + 1):
-            own = work.cov[i, 0] * work.cov[j, 0] + work.cov[i, 1] * work.cov[j, 1]
-            own *= weight * slope * inverse * inverse * (1.0 if i == j else 2.0)
+            own = slope * inverse * inverse * (cov[i, 0] * cov[j, 0] + cov[i, 1] * cov[j, 1])
+            own *= 1.0 if i == j else 2.0
             gained += own * (total[at, 0] / power - prior[at])
-            out[at] = own / power
-            change += out[at] * (total[at, 0] - start[at])
+            slopes[at] = own / power
+            change += slopes[at] * (total[at, 0] - start[at])
             at += 1
-    out[last] = -(1.0 - detected) * (seen - gained / detected - unseen)
-    change += out[last] * (total[last, 0] - start[last])
+    slopes[last] = -(1.0 - detected) * (seen - gained / detected - unseen)
+    change += slopes[last] * (total[last, 0] - start[last])
     return detected * seen + (1.0 - detected) * unseen - change
 
 
-@inlined
-def _slope_of_course(
-    table: Table, cells: Cells, sensor: int, course: int, num: int, slopes: Floats, of_cells: Floats
-) -> float:
-    """Return the change of the tangent by a course. num: numbers of an information matrix."""
-    last, total = slopes.shape[1] - 1, 0.0
-    for entry in range(table.offsets[course], table.offsets[course + 1]):
-        own, change = slopes[table.labels[entry]], table.changes[entry]
-        total += own[last] * change[last, 0]
-        for k in range(num):
-            total += own[k] * change[k, 0]
-    total *= table.powers[sensor]
-    for entry in range(cells.offsets[course], cells.offsets[course + 1]):
-        total += of_cells[cells.cells[entry]] * cells.log_miss[entry]
-    return total
-
-
 @borrowing
-def _best_courses(
-    table: Table, cells: Cells, prices: Floats, num: int, slopes: Floats, of_cells: Floats, best: Ints
+def _best_by_tangent(
+    table: Table, cells: Cells, prices: Floats, slopes: Floats, cell_slopes: Floats, num: int, best: Ints
 ) -> float:
-    """Write the course of each sensor that is best by the tangent; returns the sum of their changes less prices."""
-    total = 0.0
+    """Write the course of each sensor that is best by the tangent; returns the sum of their changes less prices.
+
+    num: numbers of an information matrix.
+    """
+    total, last = 0.0, slopes.shape[1] - 1
     for s in range(len(best)):
         most = -math.inf
         for course in range(table.first_courses[s], table.first_courses[s + 1]):
-            gain = _slope_of_course(table, cells, s, course, num, slopes, of_cells) - prices[course]
+            gain = 0.0
+            for entry in range(table.offsets[course], table.offsets[course + 1]):
+                own, change = slopes[table.labels[entry]], table.changes[entry]
+                gain += own[last] * change[last, 0]
+                for k in range(num):
+                    gain += own[k] * change[k, 0]
+            gain = table.powers[s] * gain - prices[course]
+            for entry in range(cells.offsets[course], cells.offsets[course + 1]):
+                gain += cell_slopes[cells.cells[entry]] * cells.log_miss[entry]
             if gain > most:
-                most, best[s] = gain, course
+                most, best[s] = gain, course - table.first_courses[s]
         total += most
     return total
 
@@ -196,30 +152,25 @@ def _best_courses(
 @kernel
 def relaxed_bound(table: Table, valuation: Valuation, cells: Cells, prices: Floats) -> float:
     """Return an upper bound on the expected loss, as a reward, of all joint actions; inf if the arithmetic fails."""
-    (num_labels, size), num_sensors, n = table.start.shape, len(table.powers), valuation.covs.shape[1]
-    at = Ascent(np.zeros(num_sensors, np.int64), start_totals(table), np.zeros(len(cells.worth)))
-    for s in range(num_sensors):
-        begin, end = table.first_courses[s], table.first_courses[s + 1]
-        for course in range(begin, end):
-            add_scans(table, cells, s, course, 1.0 / (end - begin), at)
-    work = _Work(np.empty((n, n)), np.empty((n, n)), np.empty((n, n)))
-    unseen, slopes = values_without_scans(table.start, valuation), np.empty((num_labels, size))
-    ends, least = np.empty(num_labels), math.inf
-    for label in range(num_labels):
-        ends[label] = _end_of_line(valuation, table.start[label], label)
+    firsts, num_labels, dim, least = table.first_courses, len(table.start), valuation.covs.shape[1], math.inf
+    at = Ascent(np.zeros(len(table.powers), np.int64), start_totals(table), np.zeros(len(cells.worth)))
+    for s in range(len(at.chosen)):
+        for course in range(firsts[s], firsts[s + 1]):
+            add_scans(table, cells, s, course, 1.0 / (firsts[s + 1] - firsts[s]), at)
+    unseen, slopes = values_without_scans(table.start, valuation), np.empty(table.start.shape)
+    work = make_value_work(valuation, 1)
     for step in range(_NUM_TANGENTS):
-        bound = 0.0
+        bound, share = 0.0, 2.0 / (step + 4.0)
         for label in range(num_labels):
-            start, total, own = table.start[label], at.totals[label], slopes[label]
-            bound += _tangent(valuation, start, label, unseen[label, 0], ends[label], total, work, own)
-        of_cells = -cells.worth * np.exp(at.cell_totals)
-        bound += np.sum(cells.worth + of_cells - of_cells * at.cell_totals)
-        bound += _best_courses(table, cells, prices, n * (n + 1) // 2, slopes, of_cells, at.chosen)
-        least, share = min(least, bound), 2.0 / (step + 4.0)
-        for label in range(num_labels):
-            for k in range(size):
-                at.totals[label, k, 0] += share * (table.start[label, k] - at.totals[label, k, 0])
+            start, total = table.start[label], at.totals[label]
+            bound += _tangent(valuation, label, unseen[label, 0], start, total, work, slopes[label])
+            for k in range(len(start)):
+                total[k, 0] += share * (start[k] - total[k, 0])
+        cell_slopes = -cells.worth * np.exp(at.cell_totals)
+        bound += np.sum(cells.worth + cell_slopes - cell_slopes * at.cell_totals)
+        bound += _best_by_tangent(table, cells, prices, slopes, cell_slopes, dim * (dim + 1) // 2, at.chosen)
+        least = min(least, bound)
         at.cell_totals[:] = (1.0 - share) * at.cell_totals
-        for s in range(num_sensors):
-            add_scans(table, cells, s, at.chosen[s], share, at)
+        for s in range(len(at.chosen)):
+            add_scans(table, cells, s, firsts[s] + at.chosen[s], share, at)
     return least

@@ -14,14 +14,14 @@ import numpy as np
 from vedette.errors import NumericalError
 from vedette.kernels.base.compile import borrowing, inlined, kernel
 from vedette.kernels.base.types import Floats, Sensor
-from vedette.kernels.gaussian.detection import BY_NODES, detection_within
+from vedette.kernels.gaussian.detection import BY_NODES, detection_probability, root_of_position
 from vedette.kernels.gaussian.innovation import Innovation, expect_measurement, make_innovation
 from vedette.kernels.gaussian.linalg import cholesky, inverse_from_factor
 from vedette.kernels.gaussian.prediction import predict
 from vedette.kernels.gaussian.relinearisation import Pair, PairWork, learn_at_mean
 from vedette.kernels.gaussian.scratch import Scratch, make_scratch
 from vedette.kernels.gaussian.sigma_points import LINEARISED, SWITCHED
-from vedette.kernels.planning.batched_models import ANY, Offsets, make_offsets, mean_detection_by_form
+from vedette.kernels.planning.batched_models import Offsets, fill_detection, find_offsets, make_offsets
 from vedette.kernels.planning.bernoulli_rows import log_miss
 from vedette.kernels.planning.ideal import Decision
 from vedette.kernels.planning.known_association import Entries
@@ -40,7 +40,8 @@ class _Work(NamedTuple):
     factor: Floats  # (state_dim, state_dim)
     inverse: Floats  # (state_dim, state_dim)
     offsets: Offsets  # of the nodes of the detection probability
-    of_nodes: Floats  # (2, num_nodes)
+    states: Floats  # (state_dim, num_nodes)
+    nodes: Floats  # (2, num_nodes) weights and P_D
 
 
 @kernel
@@ -55,6 +56,7 @@ def _make_work(dim: int, meas_dim: int, num_nodes: int) -> _Work:
         np.empty((dim, dim)),
         np.empty((dim, dim)),
         make_offsets(num_nodes),
+        np.empty((dim, num_nodes)),
         np.empty((2, num_nodes)),
     )
 
@@ -92,6 +94,30 @@ def _update_cov(
 
 
 @borrowing
+def _detection(decision: Decision, pose: Floats, mean: Floats, cov: Floats, reach: float, work: _Work) -> float:
+    """Return the detection probability of a Gaussian; nodes beyond `reach`, where P_D is 0, are not evaluated."""
+    sensor, x, y, weights, num, total = decision.sensor, work.states[0], work.states[1], work.nodes[0], 0, 0.0
+    if sensor.detection_rule != BY_NODES:
+        return detection_probability(sensor, pose, mean, cov, work.scratch.points[0])
+    nodes, root = sensor.detection_nodes, root_of_position(cov)
+    for i in range(len(nodes)):
+        x[i] = mean[0] + root[0] * nodes[i, 1]
+    for i in range(len(nodes)):
+        y[i] = mean[1] + root[1] * nodes[i, 1] + root[2] * nodes[i, 2]
+    for i in range(len(nodes)):
+        if (x[i] - pose[0]) ** 2 + (y[i] - pose[1]) ** 2 <= reach * reach:
+            x[num], y[num], weights[num] = x[i], y[i], nodes[i, 0]
+            num += 1
+    for j in range(2, len(mean)):
+        work.states[j, :num] = mean[j]
+    find_offsets(pose, work.states, num, work.offsets)
+    fill_detection(sensor, decision.forms, pose, work.states, work.offsets, num, work.scratch, work.nodes[1])
+    for i in range(num):
+        total += weights[i] * work.nodes[1, i]
+    return min(total, 1.0)  # weights sum to 1 but for rounding
+
+
+@borrowing
 def _is_seen(
     belief: Belief,
     decision: Decision,
@@ -104,17 +130,11 @@ def _is_seen(
 ) -> bool:
     """Return True if a label's detection probability is at least `least` at some step; writes the probabilities."""
     paths, seen = belief.paths, False
-    by_form = decision.forms.detection != ANY and decision.sensor.detection_rule == BY_NODES
     for h in range(len(detections)):
-        pose, state, detections[h] = decision.horizon.poses[course, h], work.scratch.points[0], 0.0
+        pose, detections[h] = decision.horizon.poses[course, h], 0.0
         if not is_beyond(belief.paths, belief.radii, decision.horizon, course, label, h, reach):
             mean, cov = paths.means[label, h], paths.covs[label, h]
-            if by_form:
-                detections[h] = mean_detection_by_form(
-                    decision.sensor, decision.forms, pose, mean, cov, reach, work.offsets, work.of_nodes
-                )
-            else:
-                detections[h] = detection_within(decision.sensor, pose, mean, cov, state, reach)
+            detections[h] = _detection(decision, pose, mean, cov, reach, work)
             seen |= detections[h] >= least
     return seen
 
