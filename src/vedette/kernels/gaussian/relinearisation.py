@@ -224,26 +224,26 @@ def learn_at_mean(sensor: Sensor, pair: Pair, share: float, work: PairWork) -> N
     """Write the posterior covariance (-> that of the innovation) of a part of a measurement of a target at the mean.
 
     For linearised measurements. The peak of prior times likelihood is then the mean, and a `share` of the information
-    of a linear measurement is a measurement with so much more noise. pair: with the measurement at its mean.
+    of a linear measurement is a measurement with so much more noise. pair: its measurement is not read.
     """
     innovation, scratch, n, m = work.innovation, work.scratch, pair.mean.shape[0], work.innovation.predicted.shape[1]
     state, jacobian, noise = scratch.points[0], scratch.measurement_jacobian, scratch.measurement_noise
-    for j in range(n):
-        state[j] = pair.mean[j]
+    factor, cross, posterior = innovation.factor[0], innovation.whitened_cross[0], innovation.covs[0]
     sensor.measurement_noise_cov(pair.mean, pair.pose, sensor.noise_params, noise)
-    for a in range(m):
-        innovation.predicted[0, a] = pair.measurement[a]
-    sensor.measurement_jacobian(state, pair.pose, sensor.measurement_params, jacobian)
+    sensor.measurement_jacobian(pair.mean, pair.pose, sensor.measurement_params, jacobian)
     ignore_ambiguous(sensor, jacobian, pair.cov, noise)
     if sensor.method == SWITCHED and bends_over(pair.pose, pair.mean, pair.cov, jacobian, noise, n, m):
-        _update(sensor, pair, state, work)
-        _leave_sensor(pair, state, innovation.covs[0])
-        _linearise(sensor, pair, state, work)
+        condition_linear(pair.mean, pair.cov, factor, cross, scratch, posterior)
+        for j in range(n):
+            state[j] = pair.mean[j]
+        _leave_sensor(pair, state, posterior)
+        sensor.measurement_jacobian(state, pair.pose, sensor.measurement_params, jacobian)
+        condition_linear(pair.mean, pair.cov, factor, cross, scratch, posterior)
         _regress(sensor, pair, work)
     for a in range(m):
         for b in range(m):
             noise[a, b] /= share
-    _update(sensor, pair, state, work)
+    condition_linear(pair.mean, pair.cov, factor, cross, scratch, posterior)
 
 
 @inlined

@@ -16,7 +16,7 @@ from vedette.kernels.base.compile import borrowing, inlined, kernel
 from vedette.kernels.base.types import Floats, Sensor
 from vedette.kernels.gaussian.detection import BY_NODES, detection_probability, root_of_position
 from vedette.kernels.gaussian.innovation import Innovation, expect_measurement, make_innovation
-from vedette.kernels.gaussian.linalg import cholesky, inverse_from_factor
+from vedette.kernels.gaussian.linalg import cholesky, inverse_from_factor, sandwich
 from vedette.kernels.gaussian.prediction import predict
 from vedette.kernels.gaussian.relinearisation import Pair, PairWork, learn_at_mean
 from vedette.kernels.gaussian.scratch import Scratch, make_scratch
@@ -33,7 +33,6 @@ class _Work(NamedTuple):
 
     scratch: Scratch
     seen: Innovation  # of one entry
-    measurement: Floats  # (meas_dim,)
     predicted_mean: Floats  # (state_dim,)
     predicted_cov: Floats  # (state_dim, state_dim)
     cov: Floats  # (state_dim, state_dim)
@@ -49,7 +48,6 @@ def _make_work(dim: int, meas_dim: int, num_nodes: int) -> _Work:
     return _Work(
         make_scratch(dim, meas_dim),
         make_innovation(1, dim, meas_dim),
-        np.empty(meas_dim),
         np.empty(dim),
         np.empty((dim, dim)),
         np.empty((dim, dim)),
@@ -78,8 +76,8 @@ def _update_cov(
     """
     n, prior, updated = len(mean), work.inverse, work.predicted_cov
     if sensor.method == LINEARISED or sensor.method == SWITCHED:
-        sensor.measurement(mean, pose, sensor.measurement_params, work.measurement)
-        learn_at_mean(sensor, Pair(pose, mean, cov, work.measurement), detection, PairWork(work.seen, work.scratch))
+        pair = Pair(pose, mean, cov, work.seen.predicted[0])
+        learn_at_mean(sensor, pair, detection, PairWork(work.seen, work.scratch))
         for i in range(n):
             for j in range(n):
                 out[i, j] = work.seen.covs[0, i, j]
@@ -108,6 +106,8 @@ def _detection(decision: Decision, pose: Floats, mean: Floats, cov: Floats, reac
         if (x[i] - pose[0]) ** 2 + (y[i] - pose[1]) ** 2 <= reach * reach:
             x[num], y[num], weights[num] = x[i], y[i], nodes[i, 0]
             num += 1
+    if num == 0:
+        return 0.0
     for j in range(2, len(mean)):
         work.states[j, :num] = mean[j]
     find_offsets(pose, work.states, num, work.offsets)
@@ -154,14 +154,16 @@ def _expected_cov(
 
     A scan with a detection probability below `least` gives no information about the state.
     """
-    paths, horizon, n = belief.paths, decision.horizon, out.shape[0]
+    paths, horizon, forms, n = belief.paths, decision.horizon, decision.forms, out.shape[0]
     missed, was_seen = 0.0, False
     for h in range(horizon.poses.shape[1]):
         mean, cov, detection = paths.means[label, h], paths.covs[label, h], detections[h]
+        if was_seen and forms.is_linear == 1:
+            sandwich(forms.transition, out, forms.motion_noise, work.scratch.product, work.cov)
+        elif was_seen:
+            before = paths.means[label, h - 1]
+            predict(decision.motion, horizon.dt, before, out, work.predicted_mean, work.cov, work.scratch)
         if was_seen:
-            predict(
-                decision.motion, horizon.dt, paths.means[label, h - 1], out, work.predicted_mean, work.cov, work.scratch
-            )
             cov = work.cov
         missed += log_miss(detection)
         if detection < least:
