@@ -39,12 +39,14 @@ class _Work(NamedTuple):
     factor: Floats  # (state_dim, state_dim)
     inverse: Floats  # (state_dim, state_dim)
     offsets: Offsets  # of the nodes of the detection probability
-    states: Floats  # (state_dim, num_nodes)
-    nodes: Floats  # (2, num_nodes) weights and P_D
+    nodes: Floats  # (3, num_nodes) weights and two standard deviates
+    states: Floats  # (state_dim, num_nodes) at the nodes in reach
+    weights: Floats  # (num_nodes,) of the nodes in reach
+    found: Floats  # (num_nodes,) P_D there
 
 
 @kernel
-def _make_work(dim: int, meas_dim: int, num_nodes: int) -> _Work:
+def _make_work(dim: int, meas_dim: int, nodes: Floats) -> _Work:
     return _Work(
         make_scratch(dim, meas_dim),
         make_innovation(1, dim, meas_dim),
@@ -53,9 +55,11 @@ def _make_work(dim: int, meas_dim: int, num_nodes: int) -> _Work:
         np.empty((dim, dim)),
         np.empty((dim, dim)),
         np.empty((dim, dim)),
-        make_offsets(num_nodes),
-        np.empty((dim, num_nodes)),
-        np.empty((2, num_nodes)),
+        make_offsets(len(nodes)),
+        nodes.T.copy(),
+        np.empty((dim, len(nodes))),
+        np.empty(len(nodes)),
+        np.empty(len(nodes)),
     )
 
 
@@ -94,27 +98,44 @@ def _update_cov(
 @borrowing
 def _detection(decision: Decision, pose: Floats, mean: Floats, cov: Floats, reach: float, work: _Work) -> float:
     """Return the detection probability of a Gaussian; nodes beyond `reach`, where P_D is 0, are not evaluated."""
-    sensor, x, y, weights, num, total = decision.sensor, work.states[0], work.states[1], work.nodes[0], 0, 0.0
+    sensor, x, y, squares, num, limit = (
+        decision.sensor,
+        work.states[0],
+        work.states[1],
+        work.offsets.squares,
+        0,
+        reach * reach,
+    )
     if sensor.detection_rule != BY_NODES:
         return detection_probability(sensor, pose, mean, cov, work.scratch.points[0])
-    nodes, root = sensor.detection_nodes, root_of_position(cov)
-    for i in range(len(nodes)):
-        x[i] = mean[0] + root[0] * nodes[i, 1]
-    for i in range(len(nodes)):
-        y[i] = mean[1] + root[1] * nodes[i, 1] + root[2] * nodes[i, 2]
-    for i in range(len(nodes)):
-        if (x[i] - pose[0]) ** 2 + (y[i] - pose[1]) ** 2 <= reach * reach:
-            x[num], y[num], weights[num] = x[i], y[i], nodes[i, 0]
-            num += 1
+    weights, u, v, found, root = work.nodes[0], work.nodes[1], work.nodes[2], work.found, root_of_position(cov)
+    middle_x, middle_y, px, py, total, rest = mean[0], mean[1], pose[0], pose[1], 0.0, 0.0
+    for i in range(len(u)):
+        x[i] = middle_x + root[0] * u[i]
+    for i in range(len(u)):
+        y[i] = middle_y + root[1] * u[i] + root[2] * v[i]
+    for i in range(len(u)):
+        squares[i] = (x[i] - px) ** 2 + (y[i] - py) ** 2
+    for i in range(len(u)):
+        num += squares[i] <= limit
     if num == 0:
         return 0.0
+    if num < len(u):
+        weights, num = work.weights, 0
+        for i in range(len(u)):
+            if squares[i] <= limit:
+                x[num], y[num], weights[num] = x[i], y[i], work.nodes[0, i]
+                num += 1
     for j in range(2, len(mean)):
         work.states[j, :num] = mean[j]
     find_offsets(pose, work.states, num, work.offsets)
-    fill_detection(sensor, decision.forms, pose, work.states, work.offsets, num, work.scratch, work.nodes[1])
-    for i in range(num):
-        total += weights[i] * work.nodes[1, i]
-    return min(total, 1.0)  # weights sum to 1 but for rounding
+    fill_detection(sensor, decision.forms, pose, work.states, work.offsets, num, work.scratch, found)
+    for i in range(0, num - 1, 2):
+        total += weights[i] * found[i]
+        rest += weights[i + 1] * found[i + 1]
+    if num % 2 == 1:
+        total += weights[num - 1] * found[num - 1]
+    return min(total + rest, 1.0)  # weights sum to 1 but for rounding
 
 
 @borrowing
@@ -195,7 +216,7 @@ def fill_expected_changes(
     P_D is that of the prediction, even if earlier scans of the horizon are expected to have reduced its covariance.
     """
     dim, size = belief.paths.means.shape[2], bases.shape[1]
-    work = _make_work(dim, len(decision.sensor.periods), len(decision.sensor.detection_nodes))
+    work = _make_work(dim, len(decision.sensor.periods), decision.sensor.detection_nodes)
     cov, information, detections = np.empty((dim, dim)), np.empty((dim, dim)), np.empty(belief.paths.means.shape[1])
     for course in range(first, last):
         for entry in range(entries.first[course], entries.last[course]):

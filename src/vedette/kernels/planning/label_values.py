@@ -26,6 +26,9 @@ POWER_INTEGRALS = 0
 EXPECTED_LOSS = 1
 FUNCTION = 2
 
+# A smaller probability of detection is what rounding leaves of scans that were added and subtracted again.
+_LEAST_DETECTED = 1e-12
+
 
 @typed_by_fields
 class Valuation(NamedTuple):
@@ -133,13 +136,14 @@ def _expected_loss(valuation: Valuation, label: int, sample: int, work: ValueWor
     existence = 1.0 / (1.0 + math.exp(-prior[size - 2]))
     detected = -math.expm1(work.total[size - 1, sample])
     seen = unseen
-    if detected > 0.0:
+    if detected > _LEAST_DETECTED:
         share, n = 1.0 / detected, work.cov.shape[0]
         if n == 4:  # a constant size is unrolled by the compiler
             trace = _position_trace(work.total, sample, prior, share, work.cov, 4)
         else:
             trace = _position_trace(work.total, sample, prior, share, work.cov, n)
-        seen = min(trace, valuation.params[0]) ** valuation.params[1]
+        seen, half = min(trace, valuation.params[0]), valuation.params[1]
+        seen = math.sqrt(seen) if half == 0.5 else seen**half
     return float(-valuation.params[2] * existence * (detected * seen + (1.0 - detected) * unseen))
 
 
