@@ -17,6 +17,7 @@ from vedette.kernels.base.types import Floats
 from vedette.kernels.planning.ascent import Cells
 from vedette.kernels.planning.bernoulli_rows import Table
 from vedette.kernels.planning.bounds import relaxed_bound
+from vedette.kernels.planning.joint_values import label_values
 from vedette.kernels.planning.label_values import EXPECTED_LOSS, Valuation
 
 NUM_INFORMATION = 10  # numbers of a lower triangle of four components
@@ -155,3 +156,13 @@ def test_labels_that_may_be_seen_in_too_many_ways_have_no_bound_of_their_own() -
     additive = random_problem(1, order=1.0, fused=False)
     assert np.isinf(label_upper_bounds(additive, 0)).all()
     assert np.isfinite(label_upper_bounds(additive, 10**6)).all()
+
+
+def test_what_rounding_leaves_of_scans_is_no_detection() -> None:
+    """An ascent adds and subtracts scans; divided by a detection of 1e-17, what is left of them would be anything."""
+    additive = random_problem(2, order=1.0, fused=False)
+    before = additive.with_scans(np.full(len(additive.table.powers), -1))
+    after = before.copy()
+    after[:, -1] = -1e-17
+    after[:, :NUM_INFORMATION] *= 1.0 - 1e-15
+    np.testing.assert_array_equal(label_values(after, additive.valuation), label_values(before, additive.valuation))

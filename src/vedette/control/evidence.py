@@ -204,10 +204,10 @@ class Evidence:
             shape.append(len(own.courses))
         spread = np.ix_(*columns_of)
         # The first evaluation is used: a later one, along a line, may differ from it in the last digit.
-        places, first = np.unique(np.ravel_multi_index(tuple(actions.T), shape), return_index=True)
+        places = np.ravel_multi_index(tuple(actions[::-1].T), shape)
         for values in (means, errors):
             table = np.full(shape, math.nan)
-            table.flat[places] = values[first]
+            table.flat[places] = values[::-1]  # of equal places the last value stays
             filled.append(table[spread])
         return RewardTable(sensors, *filled)
 

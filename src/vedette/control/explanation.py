@@ -19,10 +19,6 @@ _MOST_ROWS = 10
 _SAME = 1e-9
 
 
-# Largest relative gap of a bound that is printed.
-_CLOSE = 0.2
-
-
 @dataclass(frozen=True, slots=True)
 class Bound:
     """Upper bound on the reward of the best joint action, on the same samples.
@@ -48,7 +44,7 @@ class Bound:
     @property
     def is_close(self) -> bool:
         """Whether the gap is at most a fifth of the reward; texts and tables leave out looser bounds."""
-        return self.relative <= _CLOSE
+        return self.relative <= 0.2
 
     @property
     def relative(self) -> float:

@@ -96,6 +96,9 @@ def forms_of(motion: Motion, sensor: Sensor, dt: float, state_dim: int, turns: b
 
     turns: whether the sensor is a rotating radar, whose measurements have none of the forms.
     """
+    detection, seen = ANY if turns else _DETECTIONS.get(sensor.prob_detection, ANY), sensor.detection_params
+    if detection == SOFT_EDGE and (seen[2] < math.pi or seen[4] > 0.0):  # with an angular edge
+        detection = ANY
     is_linear = motion.method == LINEARISED and (motion.transition, motion.process_noise_cov) in _LINEAR
     if is_linear:
         functions = motion.transition_jacobian, motion.process_noise_cov
@@ -110,14 +113,9 @@ def forms_of(motion: Motion, sensor: Sensor, dt: float, state_dim: int, turns: b
         step[1],
         ANY if turns else _MEASUREMENTS.get(sensor.measurement, ANY),
         ANY if turns else _NOISES.get(sensor.measurement_noise_cov, ANY),
-        ANY if turns else _detection_form(sensor),
+        detection,
         MAX_PROB_DETECTION,
     )
-
-
-def _detection_form(sensor: Sensor) -> int:
-    form, params = _DETECTIONS.get(sensor.prob_detection, ANY), sensor.detection_params
-    return ANY if form == SOFT_EDGE and (params[2] < math.pi or params[4] > 0.0) else form  # with an angular edge
 
 
 @lru_cache(maxsize=100)

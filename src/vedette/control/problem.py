@@ -63,7 +63,7 @@ def joint_problem(evidence: Evidence, mask: Mask | None) -> JointProblem:
 
     def line(through: tuple[int, ...], sensor: int) -> Floats:
         rewards = additive.line(np.array(through), sensor)
-        _note_line(evidence, mask, through, sensor, rewards)
+        _note_lines(evidence, mask, through, [sensor], rewards)
         means = rewards.mean(axis=1)
         return np.where(np.isnan(means), -np.inf, means)
 
@@ -91,14 +91,16 @@ def note_lines(evidence: Evidence, choice: Sequence[int], mask: Mask | None) -> 
     if not evidence.holds(choice):
         evidence.evaluate(chosen[np.newaxis])
     if evaluator.additive is not None and not evidence.is_complete():
-        rewards = evaluator.additive.lines(chosen)
-        for s, own in enumerate(np.split(rewards, np.cumsum(evidence.shape)[:-1])):
-            _note_line(evidence, mask, choice, s, own)
+        _note_lines(evidence, mask, choice, range(len(choice)), evaluator.additive.lines(chosen))
 
 
-def _note_line(evidence: Evidence, mask: Mask | None, through: Sequence[int], sensor: int, rewards: Floats) -> None:
-    actions = np.tile(np.array(through, np.int64), (evidence.shape[sensor], 1))
-    actions[:, sensor] = np.arange(evidence.shape[sensor])
+def _note_lines(
+    evidence: Evidence, mask: Mask | None, through: Sequence[int], sensors: Sequence[int], rewards: Floats
+) -> None:
+    """Keep the rewards of the lines of some sensors through a joint action, one line after the other."""
+    sizes = [evidence.shape[s] for s in sensors]
+    actions = np.tile(np.array(through, np.int64), (len(rewards), 1))
+    actions[np.arange(len(rewards)), np.repeat(sensors, sizes)] = np.concatenate([np.arange(size) for size in sizes])
     is_allowed = slice(None) if mask is None else mask.allows(actions)
     evidence.note(actions[is_allowed], rewards[is_allowed])
 

@@ -185,26 +185,18 @@ def cells_of(
     worth: value of finding a target, in units of the reward. first_courses: (num_sensors + 1,) first course of each
     sensor. Raises `ModelError` from the sensor models.
     """
-    num_courses = int(first_courses[-1])
-    of_courses: list[tuple[Ints, Floats]] = [(np.empty(0, np.int64), np.empty(0))] * num_courses
+    courses, cells, log_miss = [np.empty(0, np.int64)], [np.empty(0, np.int64)], [np.empty(0)]
     states, weights = undetected.grid.states(state_dim), undetected.grid.node_weights()
     with model_errors():
         for group in start.groups:
-            offsets, cells, log_miss = _view(group, states, weights)
-            for i, course in enumerate(places_of_courses(group, first_courses).tolist()):
-                own = slice(offsets[i], offsets[i + 1])
-                of_courses[course] = (cells[own], np.maximum(log_miss[own], _LEAST_LOG_MISS))
-    return Cells(
-        offsets_of([len(cells) for cells, _ in of_courses]),
-        np.concatenate([np.empty(0, np.int64), *(cells for cells, _ in of_courses)]),
-        np.concatenate([np.empty(0), *(log_miss for _, log_miss in of_courses)]),
-        worth * undetected.expected,
-    )
-
-
-def _view(group: SensorGroup, states: Floats, weights: Floats) -> tuple[Ints, Ints, Floats]:
-    decision, horizon = group.decision, group.decision.horizon
-    view: tuple[Ints, Ints, Floats] = cells_in_view(
-        decision.sensor, horizon.poses, horizon.scans, states, weights, LEAST_DETECTION, group.reach
-    )
-    return view
+            sensor, horizon = group.decision.sensor, group.decision.horizon
+            offsets, seen, missed = cells_in_view(
+                sensor, horizon.poses, horizon.scans, states, weights, LEAST_DETECTION, group.reach
+            )
+            courses.append(np.repeat(places_of_courses(group, first_courses), np.diff(offsets)))
+            cells.append(seen)
+            log_miss.append(np.maximum(missed, _LEAST_LOG_MISS))
+    course = np.concatenate(courses)
+    order, sizes = np.argsort(course, kind="stable"), np.bincount(course, minlength=int(first_courses[-1]))
+    found = np.concatenate(cells)[order], np.concatenate(log_miss)[order]
+    return Cells(offsets_of(sizes), *found, worth * undetected.expected)

@@ -57,7 +57,7 @@ def posterior_of_squares(
                 for a in range(m):
                     total -= gain[a, i] * scratch.measurement_jacobian[a, j]
                 rest[i, j] = total
-        sandwich(rest, cov, scratch.noise, scratch.product, out)
+        sandwich(rest, cov, scratch.noise, scratch.product, out, n)
         return
     for k in range(num):
         for j in range(n):

@@ -97,19 +97,8 @@ def inverse_from_factor(factor: Floats, out: Floats) -> None:
 
 
 @inlined
-def sandwich(jacobian: Floats, cov: Floats, noise: Floats, product: Floats, out: Floats) -> None:
+def sandwich(jacobian: Floats, cov: Floats, noise: Floats, product: Floats, out: Floats, n: int) -> None:
     """out = jacobian cov jacobian' + noise."""
-    # A constant size is unrolled by the compiler, which halves the cost of the two usual ones.
-    if out.shape[0] == 4:
-        _sandwich_of_size(jacobian, cov, noise, product, out, 4)
-    elif out.shape[0] == 5:
-        _sandwich_of_size(jacobian, cov, noise, product, out, 5)
-    else:
-        _sandwich_of_size(jacobian, cov, noise, product, out, out.shape[0])
-
-
-@inlined
-def _sandwich_of_size(jacobian: Floats, cov: Floats, noise: Floats, product: Floats, out: Floats, n: int) -> None:
     for i in range(n):
         for j in range(n):
             total = 0.0

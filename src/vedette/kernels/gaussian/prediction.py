@@ -42,7 +42,13 @@ def predict(
     if motion.method == LINEARISED:
         motion.transition(mean, dt, motion.transition_params, out_mean)
         motion.transition_jacobian(mean, dt, motion.transition_params, scratch.jacobian)
-        sandwich(scratch.jacobian, cov, scratch.noise, scratch.product, out_cov)
+        # A constant size is unrolled by the compiler, which halves the cost of the two usual ones.
+        if n == 4:
+            sandwich(scratch.jacobian, cov, scratch.noise, scratch.product, out_cov, 4)
+        elif n == 5:
+            sandwich(scratch.jacobian, cov, scratch.noise, scratch.product, out_cov, 5)
+        else:
+            sandwich(scratch.jacobian, cov, scratch.noise, scratch.product, out_cov, n)
     else:
         _predict_sigma_points(motion, dt, mean, cov, out_mean, out_cov, scratch)
     for i in range(n):

@@ -16,7 +16,7 @@ from vedette.kernels.base.compile import borrowing, inlined, kernel
 from vedette.kernels.base.types import Floats, Sensor
 from vedette.kernels.gaussian.detection import BY_NODES, detection_probability, root_of_position
 from vedette.kernels.gaussian.innovation import Innovation, expect_measurement, make_innovation
-from vedette.kernels.gaussian.linalg import cholesky, inverse_from_factor, sandwich
+from vedette.kernels.gaussian.linalg import cholesky, inverse_from_factor
 from vedette.kernels.gaussian.prediction import predict
 from vedette.kernels.gaussian.relinearisation import Pair, PairWork, learn_at_mean
 from vedette.kernels.gaussian.scratch import Scratch, make_scratch
@@ -109,7 +109,7 @@ def _detection(decision: Decision, pose: Floats, mean: Floats, cov: Floats, reac
     if sensor.detection_rule != BY_NODES:
         return detection_probability(sensor, pose, mean, cov, work.scratch.points[0])
     weights, u, v, found, root = work.nodes[0], work.nodes[1], work.nodes[2], work.found, root_of_position(cov)
-    middle_x, middle_y, px, py, total, rest = mean[0], mean[1], pose[0], pose[1], 0.0, 0.0
+    middle_x, middle_y, px, py, total = mean[0], mean[1], pose[0], pose[1], 0.0
     for i in range(len(u)):
         x[i] = middle_x + root[0] * u[i]
     for i in range(len(u)):
@@ -130,12 +130,9 @@ def _detection(decision: Decision, pose: Floats, mean: Floats, cov: Floats, reac
         work.states[j, :num] = mean[j]
     find_offsets(pose, work.states, num, work.offsets)
     fill_detection(sensor, decision.forms, pose, work.states, work.offsets, num, work.scratch, found)
-    for i in range(0, num - 1, 2):
+    for i in range(num):
         total += weights[i] * found[i]
-        rest += weights[i + 1] * found[i + 1]
-    if num % 2 == 1:
-        total += weights[num - 1] * found[num - 1]
-    return min(total + rest, 1.0)  # weights sum to 1 but for rounding
+    return min(total, 1.0)  # weights sum to 1 but for rounding
 
 
 @borrowing
@@ -175,17 +172,13 @@ def _expected_cov(
 
     A scan with a detection probability below `least` gives no information about the state.
     """
-    paths, horizon, forms, n = belief.paths, decision.horizon, decision.forms, out.shape[0]
+    paths, horizon, n = belief.paths, decision.horizon, out.shape[0]
     missed, was_seen = 0.0, False
     for h in range(horizon.poses.shape[1]):
         mean, cov, detection = paths.means[label, h], paths.covs[label, h], detections[h]
-        if was_seen and forms.is_linear == 1:
-            sandwich(forms.transition, out, forms.motion_noise, work.scratch.product, work.cov)
-        elif was_seen:
-            before = paths.means[label, h - 1]
-            predict(decision.motion, horizon.dt, before, out, work.predicted_mean, work.cov, work.scratch)
         if was_seen:
-            cov = work.cov
+            before, cov = paths.means[label, h - 1], work.cov
+            predict(decision.motion, horizon.dt, before, out, work.predicted_mean, cov, work.scratch)
         missed += log_miss(detection)
         if detection < least:
             if was_seen:
