@@ -43,7 +43,7 @@ class Bound:
 
     @property
     def is_close(self) -> bool:
-        """Whether the gap is at most a fifth of the reward; texts and tables leave out looser bounds."""
+        """True if the gap is at most a fifth of the reward; texts and tables leave out looser bounds."""
         return self.relative <= 0.2
 
     @property

@@ -33,8 +33,8 @@ from vedette.kernels.planning.joint_values import (
 )
 from vedette.kernels.planning.label_values import Valuation, ValueWork, make_value_work
 
-# Tangents that are tried: 40 instead of 20 lower the bound by less than half a per cent of the loss.
-_NUM_TANGENTS = 20
+# Tangents that are tried: 20 instead of 12 lower the bound by at most 1.3 % of the loss (decision 9).
+_NUM_TANGENTS = 12
 
 
 class Choices(NamedTuple):

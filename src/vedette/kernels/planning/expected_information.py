@@ -132,7 +132,7 @@ def _detection(decision: Decision, pose: Floats, mean: Floats, cov: Floats, reac
     fill_detection(sensor, decision.forms, pose, work.states, work.offsets, num, work.scratch, found)
     for i in range(num):
         total += weights[i] * found[i]
-    return min(total, 1.0)  # weights sum to 1 but for rounding
+    return min(total, 1.0)  # weights sum to 1 up to rounding
 
 
 @borrowing
