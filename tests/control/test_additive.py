@@ -231,17 +231,28 @@ def plain_loss(example: Situation, evaluator: Evaluator, joint: Any, order: floa
             _, measured, _ = updated(mean, cov, centre, pose, example.sensors[s], start=mean)
             missed *= 1.0 - detection
             information += detection * (np.linalg.inv(measured) - np.linalg.inv(cov))
-        seen = np.linalg.inv(np.linalg.inv(cov) + information / (1.0 - missed))
+        seen = np.linalg.inv(np.linalg.inv(cov) + information / max(1.0 - missed, 1e-300))
         losses = [min(np.sqrt(np.trace(each[:2, :2])), 60.0) ** order for each in (seen, cov)]
         total -= prediction.existence[i] * ((1.0 - missed) * losses[0] + missed * losses[1])
     return total
 
 
+# The mean of the last two is by nodes, of which some are beyond the reach.
 @pytest.mark.parametrize("steps", [1, 2])
-@pytest.mark.parametrize(("order", "method"), [(1.0, "auto"), (2.0, "auto"), (0.7, "auto"), (1.0, "ekf")])
-def test_the_expected_loss_is_what_its_formula_says(steps: int, order: float, method: str) -> None:
+@pytest.mark.parametrize(
+    ("order", "parts"),
+    [
+        (1.0, {}),
+        (2.0, {}),
+        (0.7, {}),
+        (1.0, {"method": "ekf"}),
+        (1.0, {"detection": models.soft_sector(0.9, 450.0, range_slope=0.02, hard_limit=True)}),
+        (1.0, {"detection": models.soft_sector(0.9, 450.0, 1.0, range_slope=0.02, hard_limit=True)}),
+    ],
+)
+def test_the_expected_loss_is_what_its_formula_says(steps: int, order: float, parts: dict[str, Any]) -> None:
     settings = replace(KNOWN, horizon_steps=steps)
-    example = replace(shared(2, 4, method=method), settings=settings)
+    example = replace(shared(2, 4, **parts), settings=settings)
     assert example.state.time is not None
     last = np.array([example.state.time + steps * settings.horizon_period])
     example = replace(example, sensors=tuple(replace(own, scan_times=last) for own in example.sensors))

@@ -49,6 +49,15 @@ SENSORS: dict[str, Any] = {
     "one component": (BEARING, models.constant_noise([0.02]), models.gaussian_detection(500.0), "auto", "mean"),
     "own parts": (POLAR, models.NoiseModel(_own_noise, np.empty(0), 2), None, "auto", "centre"),
     "by nodes": (POLAR, GROWING, None, "auto", "mean"),
+    "soft edge": (POLAR, GROWING, models.soft_sector(0.9, 400.0, range_slope=0.02), "auto", "centre"),
+    "soft edge, cut": (
+        POLAR,
+        GROWING,
+        models.soft_sector(0.9, 300.0, range_slope=0.5, hard_limit=True),
+        "auto",
+        "centre",
+    ),
+    "soft sector": (POLAR, GROWING, models.soft_sector(0.9, 400.0, 1.0, range_slope=0.02), "auto", "centre"),
     "sigma points": (POLAR, GROWING, models.gaussian_detection(500.0), "ukf", "centre"),
     "nothing left": (PLACE, models.constant_noise([1e-7, 1e-7]), models.constant_detection(0.7), "auto", "centre"),
 }

@@ -24,13 +24,7 @@ from vedette.kernels.base.types import Floats, Ints
 from vedette.kernels.gaussian.linalg import cholesky, inverse_from_factor
 from vedette.kernels.planning.ascent import Ascent, Cells, add_scans, label_mean
 from vedette.kernels.planning.bernoulli_rows import Table
-from vedette.kernels.planning.joint_values import (
-    add_rows,
-    spread_row,
-    start_totals,
-    value_rows,
-    values_without_scans,
-)
+from vedette.kernels.planning.joint_values import add_rows, spread_row, start_totals, value_rows, values_without_scans
 from vedette.kernels.planning.label_values import Valuation, ValueWork, make_value_work
 
 # Tangents that are tried: 20 instead of 12 lower the bound by at most 1.3 % of the loss (decision 9).

@@ -7,6 +7,7 @@ Gaussian. As a change of a Bernoulli row, only the information matrix and log (1
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -14,6 +15,7 @@ import numpy as np
 from vedette.errors import NumericalError
 from vedette.kernels.base.compile import borrowing, inlined, kernel
 from vedette.kernels.base.types import Floats, Sensor
+from vedette.kernels.gaussian.beam import turns
 from vedette.kernels.gaussian.detection import BY_NODES, detection_probability, root_of_position
 from vedette.kernels.gaussian.innovation import Innovation, expect_measurement, make_innovation
 from vedette.kernels.gaussian.linalg import cholesky, inverse_from_factor
@@ -41,8 +43,7 @@ class _Work(NamedTuple):
     offsets: Offsets  # of the nodes of the detection probability
     nodes: Floats  # (3, num_nodes) weights and two standard deviates
     states: Floats  # (state_dim, num_nodes) at the nodes in reach
-    weights: Floats  # (num_nodes,) of the nodes in reach
-    found: Floats  # (num_nodes,) P_D there
+    found: Floats  # (2, num_nodes) weights and P_D there
 
 
 @kernel
@@ -58,8 +59,7 @@ def _make_work(dim: int, meas_dim: int, nodes: Floats) -> _Work:
         make_offsets(len(nodes)),
         nodes.T.copy(),
         np.empty((dim, len(nodes))),
-        np.empty(len(nodes)),
-        np.empty(len(nodes)),
+        np.empty((2, len(nodes))),
     )
 
 
@@ -98,17 +98,11 @@ def _update_cov(
 @borrowing
 def _detection(decision: Decision, pose: Floats, mean: Floats, cov: Floats, reach: float, work: _Work) -> float:
     """Return the detection probability of a Gaussian; nodes beyond `reach`, where P_D is 0, are not evaluated."""
-    sensor, x, y, squares, num, limit = (
-        decision.sensor,
-        work.states[0],
-        work.states[1],
-        work.offsets.squares,
-        0,
-        reach * reach,
-    )
+    sensor, x, y, squares, num = decision.sensor, work.states[0], work.states[1], work.offsets.squares, 0
     if sensor.detection_rule != BY_NODES:
         return detection_probability(sensor, pose, mean, cov, work.scratch.points[0])
-    weights, u, v, found, root = work.nodes[0], work.nodes[1], work.nodes[2], work.found, root_of_position(cov)
+    weights, u, v, found, root = work.nodes[0], work.nodes[1], work.nodes[2], work.found[1], root_of_position(cov)
+    limit = math.inf if turns(pose) else reach * reach  # a turning beam passes targets elsewhere
     middle_x, middle_y, px, py, total = mean[0], mean[1], pose[0], pose[1], 0.0
     for i in range(len(u)):
         x[i] = middle_x + root[0] * u[i]
@@ -121,7 +115,7 @@ def _detection(decision: Decision, pose: Floats, mean: Floats, cov: Floats, reac
     if num == 0:
         return 0.0
     if num < len(u):
-        weights, num = work.weights, 0
+        weights, num = work.found[0], 0
         for i in range(len(u)):
             if squares[i] <= limit:
                 x[num], y[num], weights[num] = x[i], y[i], work.nodes[0, i]
