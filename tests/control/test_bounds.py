@@ -80,9 +80,9 @@ def random_problem(seed: int, *, order: float, fused: bool) -> AdditiveRewards:
         covs,
     )
     views = [np.flatnonzero(rng.random(num_cells) < 0.6) for _ in range(sizes.sum())]
-    miss = np.log1p(-rng.uniform(0.0, 0.99, sum(map(len, views))))
+    log_miss = np.log1p(-rng.uniform(0.0, 0.99, sum(map(len, views))))
     seen_cells = np.concatenate(views).astype(np.int64)
-    cells = Cells(offsets_of([len(own) for own in views]), seen_cells, miss, rng.uniform(0.0, cutoff, num_cells))
+    cells = Cells(offsets_of([len(own) for own in views]), seen_cells, log_miss, rng.uniform(0.0, cutoff, num_cells))
     table = Table(
         offsets_of(sizes),
         offsets_of(counts),
