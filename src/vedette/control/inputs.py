@@ -122,20 +122,19 @@ def mask_of_decision(
     constraints: Sequence[Constraint],
     sensors: Sequence[MobileSensor],
     options: Sequence[Options],
-    fused: Any,
+    state: State,
     poses: Floats,
     settings: PlanningSettings,
 ) -> Mask | None:
-    """Return the mask of feasible joint actions; None without constraints.
+    """Return the mask of feasible joint actions; None without constraints. Raises as `feasible_action_mask`.
 
-    fused: the present fused belief, from which constraints may predict targets. Raises `InputError` as
-    `feasible_action_mask`.
+    state: the present state, from which constraints may predict targets.
     """
     if not constraints:
         return None
-    beliefs = predicted_beliefs(constraints, sensors, fused, settings, 1, settings.horizon_steps)
+    beliefs = predicted_beliefs(constraints, sensors, state.fused, settings, 1, settings.horizon_steps)
     courses, scans = tuple(own.courses for own in options), tuple(own.scans for own in options)
-    situation = ConstraintContext(courses, settings.horizon_times(), beliefs, poses, scans)
+    situation = ConstraintContext(courses, settings.horizon_times(), beliefs, poses, scans, state.unseen)
     return feasible_action_mask(constraints, situation)
 
 
