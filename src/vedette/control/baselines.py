@@ -150,7 +150,7 @@ class ConstraintReportingPlanner:
             for s, (own, pose, row) in enumerate(rows)
         ]
         courses, scans = tuple(courses_of(*way) for way in arguments), tuple(scans_of(*way) for way in arguments)
-        fused, unseen = getattr(state, "fused", None), getattr(state, "unseen", None)
-        beliefs = predicted_beliefs(self.constraints, self.sensors, fused, settings, 1, settings.horizon_steps)
+        beliefs = predicted_beliefs(self.constraints, self.sensors, state, settings, 1, settings.horizon_steps)
+        unseen = getattr(state, "unseen", None)
         notes = violation_notes(self.constraints, ConstraintContext(courses, times, beliefs, at, scans, unseen))
         return replace(plan, notes=(*plan.notes, *notes))

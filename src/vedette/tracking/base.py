@@ -48,7 +48,7 @@ class State(SummaryRepr):
     time: float | None = None
     memory: Any = None
     undetected: UndetectedIntensity | None = None
-    unseen: Mapping[tuple[int, int], float] | None = None
+    unseen: dict[tuple[int, int], float] | None = None
 
     def _summary(self) -> str:
         when = "before the first scan" if self.time is None else f"after scan {self.step}, at {self.time:g} s"

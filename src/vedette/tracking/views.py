@@ -9,7 +9,6 @@ from typing import Any
 import numpy as np
 
 from vedette.densities import as_lmb, track_moments
-from vedette.models.arguments import float_array
 from vedette.platforms.camera import view_gap
 from vedette.tracking.base import State, TrackerInfo, TrackerWrapper
 
@@ -38,7 +37,7 @@ class ViewTracker(TrackerWrapper):
         """Step the wrapped tracker, whose beliefs must have labels; see `Tracker.step`."""
         after, info = self.tracker.step(state, scans, poses, time, rngs=rngs)
         tracks, before = as_lmb(after.fused).tracks, state.unseen or {}
-        scanned = float_array("poses", poses, (len(scans), None))[[scan is not None for scan in scans], np.newaxis]
+        scanned = np.asarray(poses, np.float64)[[scan is not None for scan in scans], np.newaxis]
         in_view = (view_gap(scanned, track_moments(tracks)[0][:, :2], self.radius) == 0.0).any(axis=0)
         dt = 0.0 if state.time is None else float(time) - state.time
         unseen = {

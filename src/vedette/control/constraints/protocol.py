@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 from itertools import accumulate
 from typing import NamedTuple, Protocol, TypeVar, runtime_checkable
 
@@ -33,7 +32,7 @@ class ConstraintContext(NamedTuple):
     beliefs: tuple[LabelledDensity, ...] = ()
     poses: Floats | None = None
     scans: tuple[Bools, ...] = ()
-    unseen: Mapping[tuple[int, int], float] | None = None
+    unseen: dict[tuple[int, int], float] | None = None
 
     def ways(self, sensor: int) -> Floats:
         """Return (num_courses, num_points, 2) the corners of one sensor's ways.

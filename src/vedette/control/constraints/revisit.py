@@ -73,15 +73,15 @@ class Revisit(PerSensorConstraint):
 
     def _to_places(self, situation: ConstraintContext, poses: Floats) -> Iterator[tuple[int, Floats]]:
         """Yield the sensors that must go to a place, each with the distances (num_courses,) m of its courses."""
-        if poses.shape[1] < CLOCKS + len(self.places):
-            expected = (
-                f"poses of {CLOCKS + len(self.places)} components, the last of them seconds since the last visits"
-            )
-            raise InputError(f"constraint {self.name}: expected {expected} (see Patrolling); got {poses.shape[1]}")
-        patrols, places = np.flatnonzero(poses[:, CLOCKS] >= 0.0), np.array(self.places)
-        since = poses[patrols, CLOCKS : CLOCKS + len(places)].min(axis=0, initial=math.inf)
+        places, num = np.array(self.places), CLOCKS + len(self.places)
+        if poses.shape[1] < num:
+            expected = f"poses of {num} components, the last of them seconds since the last visits (see Patrolling)"
+            raise InputError(f"constraint {self.name}: expected {expected}; got {poses.shape[1]}")
+        patrols = np.flatnonzero(poses[:, CLOCKS] >= 0.0)
+        since = poses[patrols, CLOCKS:num].min(axis=0, initial=math.inf)
         for sensor, place in self._sent(situation, patrols, poses[:, :2], places, since):
-            yield sensor, np.maximum(_gaps(situation.ways(sensor), places[place]) - self.radius, 0.0)
+            x, y = np.moveaxis(situation.ways(sensor) - places[place], 2, 0)
+            yield sensor, np.maximum(np.sqrt(least_on_legs(x, y).min(axis=1)) - self.radius, 0.0)
 
     def _to_targets(self, situation: ConstraintContext, poses: Floats) -> Iterator[tuple[int, Floats]]:
         """Yield the sensors that must see a target, each with the least distance out of view (num_courses,) m.
@@ -95,8 +95,8 @@ class Revisit(PerSensorConstraint):
         held = (lmbs[0].existence >= self.existence) & (since >= 0.0)
         paths = np.stack([track_moments(lmb.tracks)[0][held, :2] for lmb in lmbs], axis=1)
         for s, target in self._sent(situation, np.arange(len(poses)), poses, paths[:, -1], since[held]):
-            gaps = view_gap(situation.courses[s], paths[target], self.radius)
-            yield s, (gaps + np.where(situation.scans[s], 0.0, self.radius)).min(axis=1)
+            silent = ~situation.scans[s] if situation.scans else False
+            yield s, (view_gap(situation.courses[s], paths[target], self.radius) + silent * self.radius).min(axis=1)
 
     def _sent(
         self, situation: ConstraintContext, sensors: Ints, poses: Floats, places: Floats, since: Floats
@@ -150,8 +150,3 @@ def _rates(situation: ConstraintContext, sensors: Ints) -> Floats:
             rates[1, k] = np.abs(wrap_angles(courses[:, -1, POINTING] - situation.poses[sensors[k], POINTING])).max()
     rates[:, ~known] = rates.max(axis=1, keepdims=True, initial=0.0)
     return rates / _horizon(situation.times)
-
-
-def _gaps(ways: Floats, place: Floats) -> Floats:
-    """Return the least distance (num_courses,) m of each way from a place."""
-    return np.asarray(np.sqrt(least_on_legs(ways[..., 0] - place[0], ways[..., 1] - place[1]).min(axis=1)))

@@ -120,9 +120,7 @@ class MultiStepConstraints:
     def _situation(self, stage: int, places: Mapping[int, Place]) -> ConstraintContext:
         done, num = (stage - 1) * self.stages.stride, len(self.stages.times(stage))
         if stage not in self._beliefs:
-            ahead = predicted_beliefs(
-                self.constraints, self.sensors, self.state.fused, self.settings, done + 1, done + num
-            )
+            ahead = predicted_beliefs(self.constraints, self.sensors, self.state, self.settings, done + 1, done + num)
             self._beliefs[stage] = ahead
         poses = self.poses.copy()
         courses = [np.empty((0, num, self.poses.shape[1]))] * len(poses)
