@@ -258,7 +258,7 @@ def plain_loss(
             information += detection * (np.linalg.inv(measured) - np.linalg.inv(cov))
         seen = np.linalg.inv(np.linalg.inv(cov) + information / (1.0 - missed))
         losses = [min(np.sqrt(np.trace(each[:2, :2])), 60.0) ** order for each in (seen, cov)]
-        total -= ospa_of_best_estimates(prediction.existence[i], missed, *losses, 60.0**order, undetected)
+        total -= ospa_of_best_estimates(prediction.existence[i], missed, losses[0], losses[1], 60.0**order, undetected)
     return total
 
 

@@ -138,7 +138,8 @@ def test_the_seconds_in_states_are_those_since_a_scan_in_view(tmp_path: Path) ->
     scenario, states, poses_of = watched(), [], []
 
     class Spy:
-        name, planner = "spy", build_planner(watched(), "random", 1)
+        name = "spy"
+        planner: Any = build_planner(watched(), "random", 1)
 
         def plan(self, state: Any, poses: Any, *, rng: np.random.Generator) -> Any:
             states.append(state)
