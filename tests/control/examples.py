@@ -118,11 +118,12 @@ class Situation:
     beliefs: tuple[Any, ...]
     fused: Any
     poses: Any
+    undetected: Any = None
 
     @property
     def state(self) -> State:
         """After the first scan."""
-        return State(self.beliefs, self.fused, 1, 1.0)
+        return State(self.beliefs, self.fused, 1, 1.0, undetected=self.undetected)
 
     @property
     def arguments(self) -> tuple[State, Any]:

@@ -41,7 +41,7 @@ from vedette.control.rewards import (
 )
 from vedette.control.rewards.base import reward_value
 from vedette.control.search import all_joint_actions
-from vedette.densities import LMB
+from vedette.densities import LMB, UndetectedIntensity
 from vedette.densities.tracks import single_gaussians
 from vedette.fusion import ParallelUpdate
 from vedette.kernels.planning.ascent import Allowed
@@ -215,7 +215,32 @@ def test_no_joint_action_is_better_than_the_bound(reward: Any) -> None:
             assert best <= relaxed + 1e-9 * abs(best)
 
 
-def plain_loss(example: Situation, evaluator: Evaluator, joint: Any, order: float = 1.0) -> float:
+def ospa_of_best_estimates(
+    existence: float, missed: float, seen: float, unseen: float, cost: float, undetected: float
+) -> float:
+    """The mean of max(n, N) times OSPA^p of one label and a Poisson number of undetected targets, without constants.
+
+    The label is reported before it is detected if this is better in the mean. All cases are enumerated.
+    """
+    others = np.arange(200)
+    chances = np.exp(others * np.log(max(undetected, 1e-300)) - undetected - np.cumsum(np.log(np.maximum(others, 1))))
+
+    def mean(num_estimates: int, num_targets: int, error: float) -> float:
+        matched = min(num_estimates, num_targets)
+        return float(chances @ (cost * np.maximum(num_estimates, num_targets + others) - matched * (cost - error)))
+
+    def of_report(shown: int, missed: float) -> float:
+        true = (1.0 - missed) * mean(1, 1, seen) + missed * mean(shown, 1, unseen)
+        return existence * (true - mean(0, 0, 0.0)) + (1.0 - existence) * (mean(shown, 0, 0.0) - mean(0, 0, 0.0))
+
+    shown = int(of_report(1, 1.0) <= of_report(0, 1.0))
+    constant = (1.0 - existence) * (mean(shown, 0, 0.0) - mean(0, 0, 0.0))
+    return of_report(shown, missed) - constant
+
+
+def plain_loss(
+    example: Situation, evaluator: Evaluator, joint: Any, order: float = 1.0, undetected: float = 0.0
+) -> float:
     """The expected loss with cutoff 60 m of a joint action, by plain NumPy: one scan of each sensor, at the last step.
 
     With the detection of the model's own mean over the Gaussian.
@@ -233,7 +258,7 @@ def plain_loss(example: Situation, evaluator: Evaluator, joint: Any, order: floa
             information += detection * (np.linalg.inv(measured) - np.linalg.inv(cov))
         seen = np.linalg.inv(np.linalg.inv(cov) + information / max(1.0 - missed, 1e-300))
         losses = [min(np.sqrt(np.trace(each[:2, :2])), 60.0) ** order for each in (seen, cov)]
-        total -= prediction.existence[i] * ((1.0 - missed) * losses[0] + missed * losses[1])
+        total -= ospa_of_best_estimates(prediction.existence[i], missed, losses[0], losses[1], 60.0**order, undetected)
     return total
 
 
@@ -261,3 +286,18 @@ def test_the_expected_loss_is_what_its_formula_says(steps: int, order: float, pa
     found = evaluator.joint()(actions)[:, 0]
     for joint, value in zip(actions.tolist(), found.tolist(), strict=True):
         np.testing.assert_allclose(value, plain_loss(example, evaluator, joint, order), rtol=1e-9)
+
+
+@pytest.mark.parametrize("undetected", [0.0, 0.4, 3.0])
+def test_a_false_label_may_stand_for_an_undetected_target(undetected: float) -> None:
+    """Weak and sure labels, of which some are reported without a detection, among undetected targets."""
+    example = replace(shared(2, 4), settings=replace(KNOWN, undetected_target_value=0.0, horizon_steps=1))
+    grid = models.CellGrid(models.Region(-500.0, 500.0, -500.0, 500.0), 5, 5)
+    for logits in ([-3.0, 0.0, 4.0], [-0.5, 0.5, 1.0]):
+        belief = LMB(example.fused.tracks, np.array(logits))
+        intensity = UndetectedIntensity.uniform(grid, undetected)
+        given = replace(example, beliefs=(belief, belief), fused=belief, undetected=intensity)
+        evaluator, actions = additive_of(given, ExpectedLossReward(60.0)), all_joint_actions((3, 3))
+        for joint, value in zip(actions.tolist(), evaluator.joint()(actions)[:, 0].tolist(), strict=True):
+            wanted = plain_loss(given, evaluator, joint, undetected=undetected)
+            np.testing.assert_allclose(value, wanted, rtol=1e-9)

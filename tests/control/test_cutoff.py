@@ -10,8 +10,7 @@ import pytest
 
 from control.examples import KNOWN, Situation, decided, situation
 from vedette.control import ExpectedLossReward, HorizonPlanner, IndependentPlanner, JointPlanner, KullbackLeiblerReward
-from vedette.control.prediction import predicted
-from vedette.densities import LMB, at_dominant_components
+from vedette.densities import LMB
 from vedette.internal.probabilities import expit
 
 PLANNERS = (JointPlanner, IndependentPlanner, HorizonPlanner)
@@ -31,20 +30,17 @@ def alone(of: Situation, label: int) -> Situation:
 def errors(of: Situation, chosen: tuple[int, ...]) -> Any:
     """(num_labels,) existence and error at the end if detected, out of rewards under a cutoff that cuts nothing off."""
     existence = expit(of.fused.existence_logit)
-    covs = predicted(
-        at_dominant_components(of.fused), of.sensors[0].filter.targets.motion, KNOWN.horizon_steps, KNOWN.horizon_period
-    ).tracks.covs
     found = []
     for label, own in enumerate(existence):
-        loss = -decided(alone(of, label), JointPlanner, ExpectedLossReward(1e6, 2.0)).tables[0].mean[chosen] / own
-        # Where nothing is detected the error is that of the prediction; a cutoff between the two tells them apart.
-        unseen = covs[label, 0, 0] + covs[label, 1, 1]
         tiny = -decided(alone(of, label), JointPlanner, ExpectedLossReward(1e-3)).tables[0].mean[chosen] / own
         assert tiny == pytest.approx(1e-3, rel=1e-6)
-        between = np.sqrt(0.5 * (loss + unseen))
-        cut = -decided(alone(of, label), JointPlanner, ExpectedLossReward(between, 2.0)).tables[0].mean[chosen] / own
-        detected = 1.0 - (loss - cut) / (unseen - between**2)
-        found.append(np.sqrt((loss - (1.0 - detected) * unseen) / detected))
+        # These cutoffs are above all errors. A label that is not detected is not reported, and costs the cutoff.
+        near, far = (
+            -decided(alone(of, label), JointPlanner, ExpectedLossReward(cutoff, 2.0)).tables[0].mean[chosen] / own
+            for cutoff in (100.0, 110.0)
+        )
+        missed = (far - near) / (110.0**2 - 100.0**2)
+        found.append(np.sqrt((near - missed * 100.0**2) / (1.0 - missed)))
     return existence, np.array(found)
 
 

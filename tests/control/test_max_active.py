@@ -58,7 +58,7 @@ def active(num_sensors: int, num_courses: int, most: int) -> Active:
 
 def mask_for(example: Situation, *constraints: Any) -> Mask:
     options = options_of(example.sensors, example.poses, example.settings)
-    mask = mask_of_decision(constraints, example.sensors, options, example.fused, example.poses, example.settings)
+    mask = mask_of_decision(constraints, example.sensors, options, example.state, example.poses, example.settings)
     assert mask is not None
     return mask
 

@@ -11,6 +11,7 @@ from vedette.densities.estimates import Estimate
 from vedette.errors import InputError, NumericalError
 from vedette.evaluation import (
     RunMetrics,
+    TimeToTrack,
     continuity_of_run,
     gospa_of_run,
     match_run,
@@ -43,6 +44,8 @@ def test_each_column_is_its_own_measure() -> None:
     assert metrics.label_switches.tolist() == breaks.label_switches.tolist()
     assert metrics.fragmentations.tolist() == breaks.fragmentations.tolist()
     assert metrics.fragmentations.any()
+    np.testing.assert_array_equal(metrics.seconds_to_track, TimeToTrack(CUTOFF, ORDER)(record))
+    assert not np.isnan(metrics.seconds_to_track).all()
 
 
 def test_numbers_of_targets_and_pairs_agree() -> None:

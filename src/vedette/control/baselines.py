@@ -71,11 +71,10 @@ class RandomPlanner:
     def plan(self, state: State, poses: Floats, *, rng: np.random.Generator) -> Plan:
         """Return a plan drawn from `rng`; beliefs are used only by constraints."""
         generator(rng)
-        options, fused = options_of(self.sensors, poses, self.settings), None
+        options = options_of(self.sensors, poses, self.settings)
         if self.constraints:
             instance("state", state, State)
-            fused = state.fused
-        mask = mask_of_decision(self.constraints, self.sensors, options, fused, np.asarray(poses), self.settings)
+        mask = mask_of_decision(self.constraints, self.sensors, options, state, np.asarray(poses), self.settings)
         drawn = tuple(int(rng.integers(len(own.courses))) for own in options)
         joint = drawn if mask is None else nearest_feasible(mask, drawn)
         chosen = tuple(own.first_action(course) for own, course in zip(options, joint, strict=True))
@@ -151,7 +150,7 @@ class ConstraintReportingPlanner:
             for s, (own, pose, row) in enumerate(rows)
         ]
         courses, scans = tuple(courses_of(*way) for way in arguments), tuple(scans_of(*way) for way in arguments)
-        fused = getattr(state, "fused", None)
-        beliefs = predicted_beliefs(self.constraints, self.sensors, fused, settings, 1, settings.horizon_steps)
-        notes = violation_notes(self.constraints, ConstraintContext(courses, times, beliefs, at, scans))
+        beliefs = predicted_beliefs(self.constraints, self.sensors, state, settings, 1, settings.horizon_steps)
+        unseen = getattr(state, "unseen", None)
+        notes = violation_notes(self.constraints, ConstraintContext(courses, times, beliefs, at, scans, unseen))
         return replace(plan, notes=(*plan.notes, *notes))

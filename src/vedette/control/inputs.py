@@ -122,27 +122,26 @@ def mask_of_decision(
     constraints: Sequence[Constraint],
     sensors: Sequence[MobileSensor],
     options: Sequence[Options],
-    fused: Any,
+    state: State,
     poses: Floats,
     settings: PlanningSettings,
 ) -> Mask | None:
-    """Return the mask of feasible joint actions; None without constraints.
+    """Return the mask of feasible joint actions; None without constraints. Raises as `feasible_action_mask`.
 
-    fused: the present fused belief, from which constraints may predict targets. Raises `InputError` as
-    `feasible_action_mask`.
+    state: the present state, from which constraints may predict targets.
     """
     if not constraints:
         return None
-    beliefs = predicted_beliefs(constraints, sensors, fused, settings, 1, settings.horizon_steps)
+    beliefs = predicted_beliefs(constraints, sensors, state, settings, 1, settings.horizon_steps)
     courses, scans = tuple(own.courses for own in options), tuple(own.scans for own in options)
-    situation = ConstraintContext(courses, settings.horizon_times(), beliefs, poses, scans)
+    situation = ConstraintContext(courses, settings.horizon_times(), beliefs, poses, scans, state.unseen)
     return feasible_action_mask(constraints, situation)
 
 
 def predicted_beliefs(
     constraints: Sequence[Constraint],
     sensors: Sequence[MobileSensor],
-    fused: Any,
+    state: Any,
     settings: PlanningSettings,
     first: int,
     last: int,
@@ -152,6 +151,7 @@ def predicted_beliefs(
     Raises `InputError` for a belief without labels.
     """
     needing_beliefs = [constraint.name for constraint in constraints if constraint.needs_beliefs]
+    fused = getattr(state, "fused", None)
     if fused is None or not needing_beliefs:
         return ()
     if not isinstance(fused, LabelledDensity):

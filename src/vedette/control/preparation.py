@@ -89,7 +89,7 @@ class Preparation:
         planned = planning_beliefs(sensors, fusion, settings, reward, state)
         mask = None
         if constraints:
-            mask = mask_of_decision(constraints, sensors, options, state.fused, np.asarray(poses), settings)
+            mask = mask_of_decision(constraints, sensors, options, state, np.asarray(poses), settings)
         return cls(tuple(sensors), settings, reward, planned, options, mask, visibility_graph(constraints))
 
     @property

@@ -71,7 +71,7 @@ class ProgramPlanner:
         generator(rng)
         instance("state", state, State)
         options, at = options_of(self.sensors, poses, self.settings), check_poses(poses, len(self.sensors))
-        mask = mask_of_decision(self.constraints, self.sensors, options, state.fused, at, self.settings)
+        mask = mask_of_decision(self.constraints, self.sensors, options, state, at, self.settings)
         if self._program is None or state.step <= self._step:
             self._program = start_program(self.command, self.folder, "planner", self.scene(), rng, self.start_seconds)
         self._step = state.step

@@ -95,7 +95,7 @@ class RulePlanner:
         instance("state", state, State)
         options = options_of(self.sensors, poses, self.settings)
         at = np.asarray(poses, np.float64)
-        mask = mask_of_decision(self.constraints, self.sensors, options, state.fused, at, self.settings)
+        mask = mask_of_decision(self.constraints, self.sensors, options, state, at, self.settings)
         estimate, graph = self.estimate(state.fused, state.step), visibility_graph(self.constraints)
         places = np.ascontiguousarray(np.asarray(estimate.means)[:, :2])
         to_go = CostToGo.of(self.sensors, options, estimate.labels, places, graph, None)

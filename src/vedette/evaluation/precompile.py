@@ -18,7 +18,6 @@ from vedette.scenarios.build import build_experiment, build_planner
 from vedette.scenarios.sections.planners import NamedPlanner
 from vedette.simulation.experiment import Experiment
 from vedette.simulation.loop import run_stream
-from vedette.tracking import State
 
 # Settings of a decision that is made only to compile the planner.
 _QUICK_SETTINGS: dict[str, Any] = {"num_samples": 2, "horizon_steps": 1, "num_threads": 1, "confidence": None}
@@ -81,7 +80,7 @@ def _compile_planning(scenario: Scenario, name: str) -> None:
     fused = beliefs[0] if requires_common_prior(planner.fusion) else planner.fusion.fuse(beliefs)[0]
     experiment.estimate(fused, 1)
     quick_planner = replace(planner, settings=replace(planner.settings, **_QUICK_SETTINGS))
-    state = State(beliefs, fused, undetected=experiment.tracker.initial().undetected)
+    state = replace(experiment.tracker.initial(), local=beliefs, fused=fused)
     quick_planner.plan(state, experiment.poses, rng=run_stream(0, 0))
 
 

@@ -73,7 +73,7 @@ class ObservationEncoder:
         Raises `InputError` for poses that do not fit, or if no sensor has a choice.
         """
         options = options_of(self.sensors, poses, self.settings)
-        mask = mask_of_decision(self.constraints, self.sensors, options, state.fused, poses, self.settings)
+        mask = mask_of_decision(self.constraints, self.sensors, options, state, poses, self.settings)
         return DecisionContext(state, poses, options, mask, self._observation(state, poses, options, mask))
 
     def resolve_actions(self, context: DecisionContext, actions: ArrayLike) -> tuple[tuple[int, ...], int]:

@@ -31,6 +31,22 @@ def line_of_sight(pose: Floats) -> float:
     return float(pose[POINTING] if is_camera(pose) else pose[2])
 
 
+def view_gap(poses: Floats, places: Floats, radius: float) -> Floats:
+    """Return the distance in m by which a place is out of a sensor's view; 0: in view.
+
+    It is the distance beyond `radius`, m, plus, for a camera, the arc from the place to its field of view. poses: (...,
+    pose_dim). places: (..., 2) m. Both are broadcast.
+    """
+    offsets = places - poses[..., :2]
+    distances = np.hypot(offsets[..., 0], offsets[..., 1])
+    gaps = np.maximum(distances - radius, 0.0)
+    if poses.shape[-1] > HALF_WIDTH:
+        off = np.abs(wrap_angles(np.arctan2(offsets[..., 1], offsets[..., 0]) - poses[..., POINTING]))
+        half_widths = np.where(poses[..., HALF_WIDTH] > 0.0, poses[..., HALF_WIDTH], math.pi)
+        gaps = gaps + distances * np.maximum(off - half_widths, 0.0)
+    return np.asarray(gaps)
+
+
 @dataclass(frozen=True, slots=True)
 class Pointing:
     """A fixed camera that can be pointed and may zoom. Its pointing does not depend on its heading.

@@ -12,14 +12,13 @@ from vedette.kernels.base.types import Bools, Floats
 from vedette.models.arguments import positive, real, reject
 from vedette.platforms.base import (
     SWITCH,
-    Platform,
     actions_at,
-    check_platform,
     courses_of,
     prices_of,
     scans_of,
 )
 from vedette.platforms.camera import POSE_DIM
+from vedette.platforms.wrapper import PlatformWrapper
 
 # Component of a pose: remaining seconds of scanning; after the components of a camera.
 LEFT = POSE_DIM
@@ -27,7 +26,7 @@ _SLACK = 1e-9  # tolerance for rounding, relative to a time
 
 
 @dataclass(frozen=True, slots=True)
-class Operated:
+class Operated(PlatformWrapper):
     """A platform whose actions have a price, in units of the reward, and whose sensor may be switched off.
 
     An action of a sensor that can be switched has one more number, `on`: 1, or 0 for the same action with the sensor
@@ -48,14 +47,13 @@ class Operated:
             budget that is not above 0, or a refill that is negative or without a budget.
     """
 
-    platform: Platform
     price: float | str | None = None
     switchable: bool = False
     budget: float | None = None
     refill: float = 0.0
 
     def __post_init__(self) -> None:
-        check_platform("platform", self.platform)
+        PlatformWrapper.__post_init__(self)
         if isinstance(self.price, str) and self.price not in self.platform.columns:
             raise reject("price", f"a number or one of {', '.join(self.platform.columns) or 'no columns'}", self.price)
         if not isinstance(self.price, str | None):
@@ -81,10 +79,6 @@ class Operated:
         if not self.switchable:
             return rows
         return np.column_stack([np.tile(rows, (2, 1)), np.repeat([1.0, 0.0], len(rows))])
-
-    def course(self, pose: Floats, action: Floats, times: Floats) -> Floats:
-        """Return the course of the platform."""
-        return np.asarray(self.courses(pose, action[np.newaxis], times)[0])
 
     def courses(self, pose: Floats, actions: Floats, times: Floats) -> Floats:
         """Return the courses of the platform, with the remaining seconds of scanning."""

@@ -9,9 +9,10 @@ from typing import Any
 import numpy as np
 
 from vedette.errors import InputError
-from vedette.kernels.base.types import OWN_HEIGHT, Bools, Floats
+from vedette.kernels.base.types import OWN_HEIGHT, Floats
 from vedette.models.arguments import float_array, positive
-from vedette.platforms.base import Platform, check_platform, courses_of, prices_of, scans_of
+from vedette.platforms.base import courses_of
+from vedette.platforms.wrapper import PlatformWrapper
 
 # Component of a pose: seconds since the last visit of the first place; those of the other places follow.
 CLOCKS = OWN_HEIGHT + 1
@@ -19,7 +20,7 @@ _PARTS = 16  # straight segments that approximate a course, up to the last reque
 
 
 @dataclass(frozen=True, slots=True)
-class Patrolling:
+class Patrolling(PlatformWrapper):
     """A platform whose pose has the seconds since it last visited each place, from component 10 on.
 
     A course is assumed to be straight between the requested times and sixteen more.
@@ -33,28 +34,14 @@ class Patrolling:
         InputError: no platform, places of another shape, or a radius that is not above 0.
     """
 
-    platform: Platform
     places: Sequence[tuple[float, float]]
     radius: float
 
     def __post_init__(self) -> None:
-        check_platform("platform", self.platform)
+        PlatformWrapper.__post_init__(self)
         positive("radius", self.radius)
         places = float_array("places", self.places, (None, 2))
         object.__setattr__(self, "places", tuple(map(tuple, places.tolist())))
-
-    @property
-    def columns(self) -> tuple[str, ...]:
-        """Columns of the platform."""
-        return tuple(self.platform.columns)
-
-    def actions(self, pose: Floats) -> Floats:
-        """Return the actions of the platform."""
-        return np.asarray(self.platform.actions(pose))
-
-    def course(self, pose: Floats, action: Floats, times: Floats) -> Floats:
-        """Return the course of the platform, with the seconds since each place was visited."""
-        return np.asarray(self.courses(pose, action[np.newaxis], times)[0])
 
     def courses(self, pose: Floats, actions: Floats, times: Floats) -> Floats:
         """Return the courses of the platform, with the seconds since each place was visited."""
@@ -69,14 +56,6 @@ class Patrolling:
             last = np.maximum.accumulate(_last_inside(ways, at, np.array(place), self.radius), axis=1)
             courses[..., CLOCKS + k] = np.where(last >= 0.0, nodes - last, pose[CLOCKS + k] + nodes)
         return courses[:, np.searchsorted(nodes, times)]
-
-    def prices(self, actions: Floats) -> Floats:
-        """Return the prices of the platform."""
-        return prices_of("platform", self.platform, actions)
-
-    def scans(self, pose: Floats, actions: Floats, times: Floats) -> Bools:
-        """Return the scans of the platform."""
-        return scans_of("platform", self.platform, pose, actions, times)
 
 
 def _last_inside(ways: Floats, at: Floats, place: Floats, radius: float) -> Floats:

@@ -103,6 +103,7 @@ def _kinds(order: float) -> tuple[_Kind, ...]:
         _Kind("Cardinality error, size", "the same without its sign", _mean_size),
         _Kind("Label switches a run", "a target goes on under another label", _total("label_switches"), True),
         _Kind("Fragmentations a run", "a target is found again after a break", _total("fragmentations")),
+        _Kind("Seconds to track", "until a late target is first tracked", _mean_of_known("seconds_to_track")),
     )
 
 

@@ -122,7 +122,7 @@ class OraclePlanner:
             raise InputError("truth: expected the targets of the run, as of with_truth(); got None")
         current = check_poses(poses, len(self.sensors))
         options = options_of(self.sensors, current, self.settings)
-        mask = mask_of_decision(self.constraints, self.sensors, options, state.fused, current, self.settings)
+        mask = mask_of_decision(self.constraints, self.sensors, options, state, current, self.settings)
         step = max(state.step, 1)
         ids, covs = self._tracked(state, *self.truth.at(step - 1))
         best, _ = self._decide(_DecisionState(step, current, covs), self.truth, ids, self.depth, mask, rng)

@@ -17,6 +17,7 @@ from vedette.tracking.program import ProgramFilter
 from vedette.tracking.scan_network import ScanNetwork
 from vedette.tracking.snapshots import load_snapshot, save_snapshot
 from vedette.tracking.undetected import UndetectedTargetTracker
+from vedette.tracking.views import ViewTracker
 
 __all__ = [
     "BeliefNetwork",
@@ -38,6 +39,7 @@ __all__ = [
     "Tracker",
     "TrackerInfo",
     "UndetectedTargetTracker",
+    "ViewTracker",
     "failed_stage",
     "load_snapshot",
     "save_snapshot",

@@ -39,6 +39,7 @@ class State(SummaryRepr):
         memory: data of the tracker itself for the next step, such as birth candidates; None if it needs none.
         undetected: intensity of undetected targets, if `BirthModel.anywhere` has cells for those of the belief, or the
             tracker maintains it (`UndetectedTargetTracker`); else None.
+        unseen: seconds since a scan had each label in view, if the tracker maintains them (`ViewTracker`); else None.
     """
 
     local: tuple[Any, ...]
@@ -47,6 +48,7 @@ class State(SummaryRepr):
     time: float | None = None
     memory: Any = None
     undetected: UndetectedIntensity | None = None
+    unseen: dict[tuple[int, int], float] | None = None
 
     def _summary(self) -> str:
         when = "before the first scan" if self.time is None else f"after scan {self.step}, at {self.time:g} s"

@@ -186,37 +186,30 @@ class AdditiveRewards:
         return float(-(cells.worth @ np.expm1(totals)))
 
 
-def valuation_of(reward: Any, prediction: LMB, prior: Floats) -> Valuation:
+def valuation_of(reward: Any, prediction: LMB, prior: Floats, undetected: float = 0.0) -> Valuation:
     """Return the valuation of the labels of a prediction of single Gaussians, for a label reward or a power reward.
 
-    prior: (num_labels, bernoulli_size) rows of the prediction.
+    prior: (num_labels, bernoulli_size) rows of the prediction. undetected: expected number of undetected targets.
     """
-    gaussians, num_labels = prediction.tracks.to_kernel().components, len(prior)
+    gaussians, none = prediction.tracks.to_kernel().components, np.zeros((len(prior), 1))
+    unused = cardinality_variance_of_label  # only FUNCTION has a function of its own
     loss = Valuation(
-        EXPECTED_LOSS,
-        1,
-        prior,
-        np.zeros((num_labels, 1)),
-        np.empty((0, 2)),
-        0.0,
-        np.empty(0),
-        cardinality_variance_of_label,  # only used by FUNCTION
-        gaussians.means,
-        gaussians.covs,
+        EXPECTED_LOSS, 1, prior, none, np.empty((0, 2)), 0.0, np.empty(0), unused, gaussians.means, gaussians.covs
     )
     if isinstance(reward, ExpectedLossReward):
-        covs = prediction.tracks.covs
-        undetected_losses = np.minimum(covs[:, 0, 0] + covs[:, 1, 1], reward.cutoff**2)[:, np.newaxis] ** (
-            0.5 * reward.order
-        )
-        return loss._replace(own=undetected_losses, params=np.array([reward.cutoff**2, 0.5 * reward.order, 1.0]))
+        covs, cost = prediction.tracks.covs, reward.cutoff**reward.order
+        unseen = np.minimum(covs[:, 0, 0] + covs[:, 1, 1], reward.cutoff**2) ** (0.5 * reward.order)
+        # Labels that cost less if they are not reported, by odds: a false one costs c^p if no other target is missing.
+        hidden = cost - unseen < cost * np.exp(-prior[:, -2] - undetected)
+        own = np.where(hidden, cost, unseen)[:, np.newaxis]
+        return loss._replace(own=own, params=np.array([reward.cutoff**2, 0.5 * reward.order, 1.0]))
     if provides(reward, PowerReward):
         log_volume = math.log(unit_volume_of(reward, prediction))
         exponents = np.array([[float(a), float(b)] for a, b in reward.exponents])
         own = _of_prediction(prediction, exponents, log_volume, prior[:, -2])
         powers = loss._replace(kind=POWER_INTEGRALS, num=len(exponents), own=own)
         return powers._replace(exponents=exponents, log_volume=log_volume)
-    own, params = np.zeros((num_labels, reward.num_terms)), np.ascontiguousarray(reward.params, np.float64)
+    own, params = np.zeros((len(prior), reward.num_terms)), np.ascontiguousarray(reward.params, np.float64)
     return loss._replace(kind=FUNCTION, num=reward.num_terms, own=own, params=params, function=reward.function)
 
 

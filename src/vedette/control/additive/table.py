@@ -65,7 +65,7 @@ def lay_out(
         start = prepare_groups(task, rule.missing_existence, rng=rng)
         table = lay_out_changes(start, rule, num_threads, sampled=task.sampled)
     prediction = ahead.end
-    valuation = valuation_of(reward, prediction, start.prior)
+    valuation = valuation_of(reward, prediction, start.prior, 0.0 if undetected is None else undetected.total)
     cells = no_cells(len(table.offsets) - 1)
     if undetected is not None and (worth := undetected_target_value(reward, settings)) > 0.0:
         cells = cells_of(start, undetected, worth, table.first_courses, prediction.state_dim)

@@ -24,6 +24,7 @@ class ConstraintContext(NamedTuple):
     poses: (num_sensors, pose_dim) present poses, from which the way to the first of `times` starts; None: this way is
         not tested.
     scans: (num_courses, num_times) whether each course lets its sensor scan, one array per sensor; (): not known.
+    unseen: seconds since a scan had each label in view (`State.unseen`); None: not known.
     """
 
     courses: tuple[Floats, ...]
@@ -31,6 +32,7 @@ class ConstraintContext(NamedTuple):
     beliefs: tuple[LabelledDensity, ...] = ()
     poses: Floats | None = None
     scans: tuple[Bools, ...] = ()
+    unseen: dict[tuple[int, int], float] | None = None
 
     def ways(self, sensor: int) -> Floats:
         """Return (num_courses, num_points, 2) the corners of one sensor's ways.

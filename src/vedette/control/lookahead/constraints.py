@@ -24,6 +24,7 @@ from vedette.control.inputs import predicted_beliefs
 from vedette.control.settings import MobileSensor, PlanningSettings
 from vedette.densities import LabelledDensity
 from vedette.kernels.base.types import Bools, Floats
+from vedette.tracking import State
 
 
 class Stages(NamedTuple):
@@ -61,7 +62,7 @@ class MultiStepConstraints:
     Attributes:
         constraints: at least one.
         sensors, settings: as in the planner.
-        fused: the present fused belief.
+        state: the present state.
         poses: (num_sensors, pose_dim) present poses of the sensors.
         stages: the decisions.
         on_pairs: whether any constraint concerns pairs of sensors.
@@ -70,7 +71,7 @@ class MultiStepConstraints:
     constraints: tuple[Constraint, ...]
     sensors: tuple[MobileSensor, ...]
     settings: PlanningSettings
-    fused: LabelledDensity
+    state: State
     poses: Floats
     stages: Stages
     on_pairs: bool = field(init=False)
@@ -119,7 +120,7 @@ class MultiStepConstraints:
     def _situation(self, stage: int, places: Mapping[int, Place]) -> ConstraintContext:
         done, num = (stage - 1) * self.stages.stride, len(self.stages.times(stage))
         if stage not in self._beliefs:
-            ahead = predicted_beliefs(self.constraints, self.sensors, self.fused, self.settings, done + 1, done + num)
+            ahead = predicted_beliefs(self.constraints, self.sensors, self.state, self.settings, done + 1, done + num)
             self._beliefs[stage] = ahead
         poses = self.poses.copy()
         courses = [np.empty((0, num, self.poses.shape[1]))] * len(poses)
@@ -127,4 +128,5 @@ class MultiStepConstraints:
         for s, place in places.items():
             poses[s], courses[s], scans[s] = place
         times = self.stages.period * np.arange(done + 1.0, done + num + 1.0)
-        return ConstraintContext(tuple(courses), times, self._beliefs[stage], poses, tuple(scans))
+        unseen = self.state.unseen if stage == 1 else {}  # later, it depends on the earlier courses
+        return ConstraintContext(tuple(courses), times, self._beliefs[stage], poses, tuple(scans), unseen)

@@ -157,7 +157,7 @@ class HorizonPlanner:
             return _Given(stages, trees, None, planned)
         at = np.array([tree.pose for tree in trees])
         rules = FeasibleSequences.of(
-            trees, MultiStepConstraints(self.constraints, self.sensors, self.settings, state.fused, at, stages)
+            trees, MultiStepConstraints(self.constraints, self.sensors, self.settings, state, at, stages)
         )
         return _Given(stages, rules.trees, rules, planned)
 

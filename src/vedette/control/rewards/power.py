@@ -99,14 +99,19 @@ class ExpectedLossReward(Checked):
 
     The error is limited by a cutoff, beyond which a target counts as lost:
 
-        R = -sum over labels of r (q min(sqrt(tr P+), c)^p + (1 - q) min(sqrt(tr P), c)^p)
-        q = 1 - prod over sensors of (1 - P_D)
+        R = -sum over labels of r (q min(sqrt(tr P+), c)^p + (1 - q) u),  q = 1 - prod over sensors of (1 - P_D)
+        u = min(sqrt(tr P), c)^p, or c^p if r (c^p - min(sqrt(tr P), c)^p) < (1 - r) c^p exp(-n)
 
-    with the predicted existence r and covariance P of the position, the mean P_D over the predicted Gaussian, and P+
-    the covariance after the scans given that the target is detected: P+^-1 = P^-1 + sum over sensors of P_D I / q, I
-    the information of a measurement. Over a horizon of several steps, the information of each step is propagated to its
-    end. The reward has no sampling noise; it favours actions that detect every target, and detect it accurately. A
-    label that is a mixture is represented by its heaviest component.
+    This is the mean OSPA of the best estimates, without the part that does not depend on the action. A label that is
+    not detected is reported only if this costs less. A false label costs c^p unless another target is missing, for
+    which it counts then. exp(-n) is the probability that none is, with n undetected targets (`State.undetected`; 0 if
+    not known).
+
+    The existence r and the covariance P of the position are predicted, P_D is the mean over the predicted Gaussian, and
+    P+ is the covariance after the scans given that the target is detected: P+^-1 = P^-1 + sum over sensors of P_D I /
+    q, I the information of a measurement. Over a horizon of several steps, the information of each step is propagated
+    to its end. The reward has no sampling noise; it favours actions that detect every target, and detect it accurately.
+    A label that is a mixture is represented by its heaviest component.
 
     If no target is within detection range of a sensor during the horizon, or a target is out of range of all sensors,
     the loss is the mean of those at the end of the horizon and at two later times, for which sensors are assumed to

@@ -12,6 +12,7 @@ from vedette.errors import VedetteError
 from vedette.evaluation.metrics.consistency import nees_of_matching
 from vedette.evaluation.metrics.matching import match_run
 from vedette.evaluation.metrics.point_gospa import gospa_of_matching
+from vedette.evaluation.metrics.time_to_track import waiting_times
 from vedette.evaluation.metrics.track_ospa import ospa2_of_run
 from vedette.evaluation.metrics.trajectories import continuity
 from vedette.internal.representation import SummaryRepr
@@ -87,6 +88,7 @@ class RunMetrics(SummaryRepr):
         position_nees_max: largest NEES of the position; NaN without pairs.
         label_switches: number of targets matched to another label than at their last match.
         fragmentations: number of targets matched again after a break.
+        seconds_to_track: mean time until the targets that appear at the scan are first tracked (`TimeToTrack`).
         custom: custom metrics by name.
     """
 
@@ -104,6 +106,7 @@ class RunMetrics(SummaryRepr):
     position_nees_max: Floats
     label_switches: Ints
     fragmentations: Ints
+    seconds_to_track: Floats
     custom: dict[str, Floats] = field(default_factory=dict)
 
     @property
@@ -186,5 +189,6 @@ def measure(
         position_nees_max=matching.max_by_scan(position),
         label_switches=breaks.label_switches,
         fragmentations=breaks.fragmentations,
+        seconds_to_track=waiting_times(truth, matching),
     )
     return metrics.with_custom(record, custom)

@@ -7,10 +7,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from vedette.evaluation.metrics.assignment import check_parameters
-from vedette.evaluation.metrics.matching import match_run
+from vedette.evaluation.metrics.matching import Matching, match_run
 from vedette.kernels.base.types import Floats
 from vedette.models.fields import Count, check_fields
 from vedette.simulation.records import RunRecord
+from vedette.simulation.truth import Truth
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,16 +40,19 @@ class TimeToTrack:
 
     def __call__(self, record: RunRecord) -> Floats:
         """Return the metric of a run, (num_scans,), s; raise `InputError` as `match_run` does."""
-        truth = record.truth
-        _, first, target_of_row = np.unique(truth.ids, return_index=True, return_inverse=True)
-        last_rows = len(truth.ids) - 1 - np.unique(truth.ids[::-1], return_index=True)[1]
-        tracked = np.sort(match_run(truth, record.estimates, cutoff=self.cutoff, order=self.order).truth_rows)[::-1]
-        last_rows[target_of_row[tracked]] = tracked  # the first of a target's rows is assigned last, and remains
-        first_scans, waiting_times = (
-            truth.scans[first],
-            truth.times[truth.scans[last_rows]] - truth.times[truth.scans[first]],
-        )
-        counts = first_scans + 1 >= self.first_scan
-        number = np.bincount(first_scans[counts], minlength=truth.num_scans)
-        total = np.bincount(first_scans[counts], waiting_times[counts], truth.num_scans)
-        return np.where(number > 0, total / np.maximum(number, 1), np.nan)
+        matching = match_run(record.truth, record.estimates, cutoff=self.cutoff, order=self.order)
+        return waiting_times(record.truth, matching, self.first_scan)
+
+
+def waiting_times(truth: Truth, matching: Matching, first_scan: int = 2) -> Floats:
+    """Return the metric `TimeToTrack` (num_scans,), s, from the pairs of estimates and targets."""
+    _, first, target_of_row = np.unique(truth.ids, return_index=True, return_inverse=True)
+    last_rows = len(truth.ids) - 1 - np.unique(truth.ids[::-1], return_index=True)[1]
+    tracked = np.sort(matching.truth_rows)[::-1]
+    last_rows[target_of_row[tracked]] = tracked  # the first of a target's rows is assigned last, and remains
+    first_scans, last_scans = truth.scans[first], truth.scans[last_rows]
+    counts = first_scans + 1 >= first_scan
+    waited = (truth.times[last_scans] - truth.times[first_scans])[counts]
+    number = np.bincount(first_scans[counts], minlength=truth.num_scans)
+    total = np.bincount(first_scans[counts], waited, truth.num_scans)
+    return np.where(number > 0, total / np.maximum(number, 1), np.nan)

@@ -18,6 +18,7 @@ from vedette.platforms import Actions, ByCompass, Operated, Patrolling, Platform
 from vedette.platforms.base import SWITCH, actions_at
 from vedette.platforms.patrolling import CLOCKS
 from vedette.platforms.velocity import WithVelocity
+from vedette.platforms.wrapper import PlatformWrapper
 from vedette.scenarios.loading import Scenario
 from vedette.scenarios.sections.control import revisit_constraint
 from vedette.scenarios.sections.custom import Custom, MissingMember
@@ -151,7 +152,7 @@ def first_actions(scenario: Scenario, sensors: tuple[MobileSensor, ...]) -> tupl
         actions = actions_at(f"sensors[{s}].platform", sensor.platform, pose)
         rows = actions.values[:1] if row is None else np.array([row])
         platform: Any = sensor.platform
-        while isinstance(platform, Operated | Patrolling | WithVelocity):
+        while isinstance(platform, PlatformWrapper):
             platform = platform.platform
         if row is not None and isinstance(platform, ByCompass):
             rows = platform.of_plane(rows, pose)

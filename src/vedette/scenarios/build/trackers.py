@@ -9,6 +9,7 @@ from vedette.densities import LabelledDensity
 from vedette.filters import Filter, common_target_model
 from vedette.fusion import Clmb, CmDeltaGlmb, Fusion, LabelMatchedFusion
 from vedette.scenarios.loading import Scenario
+from vedette.scenarios.sections.control import revisit_constraint
 from vedette.scenarios.sections.courses import sensor_as_courses
 from vedette.scenarios.sections.fusion import SCAN_FUSIONS
 from vedette.scenarios.sections.tracking import Filter as FilterSection
@@ -21,6 +22,7 @@ from vedette.tracking import (
     ScanNetwork,
     Tracker,
     UndetectedTargetTracker,
+    ViewTracker,
 )
 
 
@@ -30,9 +32,10 @@ def build_tracker(scenario: Scenario, filters: tuple[Filter, ...]) -> Tracker:
     delays = {s: sensor.scans.late.build() for s, sensor in enumerate(scenario.model.sensors) if sensor.scans.late}
     if delays:
         tracker = DelayedScanTracker(tracker, delays)
-    if section is None or tracker.initial().undetected is not None:
-        return tracker
-    return UndetectedTargetTracker(tracker, section.build(scenario.model.region))
+    if section is not None and tracker.initial().undetected is None:
+        tracker = UndetectedTargetTracker(tracker, section.build(scenario.model.region))
+    revisit = revisit_constraint(scenario.model, of_targets=True)
+    return tracker if revisit is None else ViewTracker(tracker, revisit.radius)
 
 
 def _detection_tracker(scenario: Scenario, filters: tuple[Filter, ...]) -> Tracker:

@@ -162,7 +162,8 @@ class Control(Derived):
 def constraints_on_labels(model: ScenarioModel) -> Iterator[Finding]:
     """Yield faults of constraints on predicted targets if the filter has no labels."""
     for i, constraint in enumerate(model.control.constraints):
-        if model.filter.kind in UNLABELLED and constraint.kind == "void_probability":
+        on_labels = constraint.kind == "void_probability" or (isinstance(constraint, Revisit) and not constraint.places)
+        if model.filter.kind in UNLABELLED and on_labels:
             wanted = f"another constraint, as {model.filter.kind} filters have no labels to look ahead by"
             yield ("control", "constraints", i, "kind"), wanted, describe(constraint.kind)
 
@@ -208,25 +209,26 @@ def targets_of_rules(model: ScenarioModel) -> Iterator[Finding]:
             yield ("planners", name, "targets"), wanted, describe(list(own.targets))
 
 
-def revisit_constraint(model: ScenarioModel) -> Revisit | None:
-    """Return the constraint on places to be visited repeatedly; None if there is none."""
-    return next((own for own in model.control.constraints if isinstance(own, Revisit)), None)
+def revisit_constraint(model: ScenarioModel, *, of_targets: bool = False) -> Revisit | None:
+    """Return the constraint on places, or targets, to be visited repeatedly; None if there is none."""
+    revisits = [own for own in model.control.constraints if isinstance(own, Revisit)]
+    return next((own for own in revisits if of_targets != bool(own.places)), None)
 
 
 def one_patrol(model: ScenarioModel) -> Iterator[Finding]:
     """Yield faults of visits: they need a moving sensor, one constraint, and poses with room for the time of each."""
-    constraints = model.control.constraints
-    numbers = [i for i, own in enumerate(constraints) if isinstance(own, Revisit)]
-    if numbers and not any(sensor.platform.top_speed > 0.0 for sensor in model.sensors):
-        yield ("control", "constraints", numbers[0], "kind"), "a sensor that moves, for revisit", "none"
+    constraints, visits = model.control.constraints, revisit_constraint(model)
+    if visits and not any(sensor.platform.top_speed > 0.0 for sensor in model.sensors):
+        yield ("control", "constraints", constraints.index(visits), "kind"), "a sensor that moves, for revisit", "none"
     for s, sensor in enumerate(model.sensors):
-        if numbers and len(sensor.platform.components()) > 2:
+        if visits and len(sensor.platform.components()) > 2:
             yield ("sensors", s, "platform"), "a pose of at most five components, beside revisit", "more"
-        if numbers and is_doppler(sensor.measurement.kind):
+        if visits and is_doppler(sensor.measurement.kind):
             wanted = "no range rate, beside revisit, as poses have the velocity of a sensor or the times of its visits"
             yield ("sensors", s, "measurement", "kind"), wanted, describe(sensor.measurement.kind)
-    for i in numbers[1:]:
-        yield ("control", "constraints", i, "kind"), "one constraint revisit with all places", "another"
+    for i, own in enumerate(constraints):
+        if isinstance(own, Revisit) and own is not revisit_constraint(model, of_targets=not own.places):
+            yield ("control", "constraints", i, "kind"), "one constraint revisit with all places or targets", "another"
 
 
 DECISION_CHECKS = (constraints_on_labels, enough_switchable, longer_plans, one_patrol, targets_of_rules)

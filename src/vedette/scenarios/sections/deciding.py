@@ -98,18 +98,19 @@ class KeepOut(Section):
 
 
 class Revisit(Section):
-    """Maximum time between visits of each place, by any moving sensor."""
+    """Maximum time between visits of each place by any moving sensor, or between scans of each target by any sensor."""
 
     kind: Literal["revisit"] = Field(default="revisit", description="Kind of constraint [-].")
-    places: Annotated[tuple[Point, ...], Field(strict=False, min_length=1)] = Field(description="The places [m].")
-    radius: Positive = Field(description="Within which a sensor is at a place [m].")
-    every: Positive = Field(description="Longest time from one visit of a place to the next [s].")
+    places: Annotated[tuple[Point, ...], Field(strict=False)] = Field((), description="Places; none: targets [m].")
+    existence: Probability = Field(default=0.5, description="Of targets: the least existence probability [-].")
+    radius: Positive = Field(description="Within which a sensor is at a place, or has a target in view [m].")
+    every: Positive = Field(description="Longest time from one visit of a place or scan of a target to the next [s].")
 
     def build(self, folder: Path) -> Any:
         """Return the constraint."""
         from vedette.control.constraints import Revisit
 
-        return Revisit(self.places, self.radius, self.every)
+        return Revisit(self.places, self.radius, self.every, self.existence)
 
 
 if TYPE_CHECKING:
