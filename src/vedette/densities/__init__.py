@@ -38,6 +38,7 @@ from vedette.densities.statistics import cardinality_distribution, existence_pro
 from vedette.densities.tracks import TrackTable, mixture_moments, track_moments
 from vedette.densities.undetected import LearntRate, UndetectedIntensity, UndetectedTargets
 from vedette.densities.unlabelled import IidCluster, Poisson
+from vedette.kernels.base.types import Marks
 
 __all__ = [
     "GLMB",
@@ -49,6 +50,7 @@ __all__ = [
     "IidCluster",
     "LabelledDensity",
     "LearntRate",
+    "Marks",
     "MultiBernoulli",
     "MultiTargetSamples",
     "Poisson",

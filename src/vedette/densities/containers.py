@@ -15,8 +15,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vedette.densities.inspection import Targets
+from vedette.errors import InputError, NumericalError, VedetteError
 from vedette.internal.representation import SummaryRepr, TabularRepr
-from vedette.kernels.base.types import Floats
+from vedette.kernels.base.types import Floats, Marks, Mixture
+from vedette.kernels.gaussian.components import components_of
+from vedette.kernels.gaussian.marks import taken_marks, unmarked
+from vedette.models.arguments import no_gaussians
 
 _Made = TypeVar("_Made", bound=SummaryRepr)
 
@@ -33,11 +37,11 @@ class Container(SummaryRepr):
     def _own_arrays(self) -> None:
         """Replace the given arrays by copies; a public constructor calls this before its checks."""
         for name in self.__match_args__:  # type: ignore[attr-defined]
-            value = getattr(self, name)
-            if type(value) is np.ndarray:
-                if name == "log_class_probs" and value.shape[1:] == (0,):  # without classes
-                    value = np.empty((len(self.log_weights), 0))  # type: ignore[attr-defined]
-                object.__setattr__(self, name, _held(np.array(value, order="C")))
+            object.__setattr__(self, name, self._owned(getattr(self, name)))
+
+    def _owned(self, value: Any) -> Any:
+        """Return a read-only copy of an array or of the columns of marks, and anything else as it is."""
+        return _held(np.array(value, order="C")) if type(value) is np.ndarray else value
 
     def with_fields(self, **changed: Any) -> Self:
         """Return a copy with other values of some fields, without checks; see `unchecked`."""
@@ -47,6 +51,46 @@ class Container(SummaryRepr):
     def __reduce__(self) -> tuple[Any, ...]:
         """Unpickle through the constructor and its checks, as a pickle may come from any source."""
         return type(self), tuple(getattr(self, name) for name in self.__match_args__)  # type: ignore[attr-defined]
+
+
+class Components(Container):
+    """Base of the containers of Gaussian components."""
+
+    __slots__ = ()
+    log_weights: Floats
+    means: Floats
+    covs: Floats
+    marks: Marks
+
+    def __post_init__(self) -> None:
+        self._own_arrays()
+        self.validate(error=InputError)
+
+    @abstractmethod
+    def validate(self, *, error: type[VedetteError] = NumericalError) -> None:
+        """Raise unless the arrays are consistent and form a density."""
+
+    def _owned(self, value: Any) -> Any:
+        """Likewise. A column of marks without width gets a row for each component."""
+        if type(value) is not Marks:
+            return super()._owned(value)
+        none = np.empty((len(self.log_weights), 0))
+        return Marks(*(self._owned(none if np.shape(column)[1:] == (0,) else column) for column in value))
+
+    @property
+    def state_dim(self) -> int:
+        """Length of a target's state."""
+        return int(self.means.shape[1])
+
+    @property
+    def num_classes(self) -> int:
+        """Number of classes of targets; 0 if they have none."""
+        return int(self.marks.log_class_probs.shape[1])
+
+    def _components(self) -> Mixture:
+        """Return the components as a kernel bundle."""
+        log_weights, means, covs, *marks = _COMPONENTS(self)
+        return Mixture(log_weights, means, covs, Marks(*marks))
 
 
 class MultiTarget(Container, TabularRepr):
@@ -102,6 +146,8 @@ def unchecked(container: type[_Made], *fields: Any) -> _Made:
                 value.setflags(False)  # type: ignore[call-arg]  # three times as fast as by keyword
             else:
                 value = _held(value)
+        elif type(value) is Marks:
+            value = Marks(*map(_held, value))
         object.__setattr__(made, name, value)
     return made
 
@@ -114,6 +160,18 @@ def for_kernel(array: NDArray[Any]) -> Any:
 def kernel_arrays(*fields: str) -> Callable[[Container], tuple[Any, ...]]:
     """Return a function that gives the kernel arrays of these fields (two or more), faster than `for_kernel`."""
     return attrgetter(*(f"{field}.base" for field in fields))
+
+
+_COMPONENTS = kernel_arrays("log_weights", "means", "covs", *(f"marks.{name}" for name in Marks._fields))
+
+
+def no_components(like: Any) -> Mixture:
+    """Return no components, with the states and marks of `like`: a container of components, or a birth model.
+
+    like: may also be a state dimension; the components then have no marks.
+    """
+    dim, marks = (like.state_dim, like.marks) if hasattr(like, "marks") else (like, unmarked())
+    return components_of(np.empty(0), *no_gaussians(dim), taken_marks(marks, slice(0)))
 
 
 def _held(array: NDArray[Any]) -> NDArray[Any]:

@@ -163,7 +163,7 @@ class LabelledFilterBase(WithBirths, ABC, Generic[BeliefT]):
 
     def initial(self) -> BeliefT:
         """Return the belief before the first scan: no target."""
-        empty: BeliefT = self.kind.empty(self.targets.state_dim, self.targets.num_classes)
+        empty: BeliefT = self.kind.empty(self.targets.birth)
         return empty
 
     def _before_scan(self, prior: BeliefT, dt: float, step: Any, births: LMB | None) -> Any:

@@ -84,11 +84,11 @@ class _FactoredFilterBase(LabelledFilterBase[FactoredGLMB]):
 
     def initial(self) -> FactoredGLMB:
         """Return the belief before the first scan: no target."""
-        empty = FactoredGLMB.empty(self.targets.state_dim, self.targets.num_classes)
+        empty = FactoredGLMB.empty(self.targets.birth)
         return empty if self.births == "labelled" else empty.with_fields(undetected=self._none())
 
     def _none(self) -> UndetectedTargets:
-        return UndetectedTargets.none(self.targets.state_dim, self.targets.num_classes)
+        return UndetectedTargets.none(self.targets.birth)
 
     def limits_of(self, sensor: SensorModel) -> Limits:
         return self.limits if self.births == "poisson" else LabelledFilterBase.limits_of(self, sensor)

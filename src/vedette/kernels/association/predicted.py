@@ -56,7 +56,7 @@ def view_rows(rows: Rows, num: int) -> Rows:
         rows.labels[:num],
         rows.offsets[: num + 1],
         rows.log_absent[:num],
-        borrowed_components(rows.components, 0, num),
+        borrowed_components(rows.components, num),
         Innovation(
             innovation.predicted[:num],
             innovation.factor[:num],
