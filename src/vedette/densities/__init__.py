@@ -1,11 +1,6 @@
 """Multi-target densities, labelled and unlabelled, with Gaussian-mixture tracks."""
 
-from vedette.densities.conversions import (
-    as_glmb,
-    as_lmb,
-    marginalise,
-    resolve_labels,
-)
+from vedette.densities.conversions import as_glmb, as_lmb, marginalise, resolve_labels
 from vedette.densities.estimates import (
     Estimate,
     Estimator,

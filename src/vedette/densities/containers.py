@@ -123,11 +123,6 @@ class MultiTarget(Container, TabularRepr):
     def _detail(self) -> str:
         return self._targets().in_words()
 
-    @property
-    @abstractmethod
-    def state_dim(self) -> int:
-        """Length of a target's state."""
-
     @abstractmethod
     def cardinality(self) -> Floats:
         """Return the probabilities of 0, 1, ..., n targets; see `vedette.densities.cardinality_distribution`."""

@@ -249,12 +249,7 @@ class LabelledFilter(SingleSensorFilter, LabelledFilterBase[BeliefT]):
         return self._taken(self._before_scan(prior, 0.0, None, None), inputs, rng, [repeats], "")
 
     def _taken(
-        self,
-        prior: Any,
-        inputs: StepInputs,
-        rng: np.random.Generator | None,
-        repeats: Sequence[Ints],
-        place: str,
+        self, prior: Any, inputs: StepInputs, rng: np.random.Generator | None, repeats: Sequence[Ints], place: str
     ) -> tuple[BeliefT, FilterInfo]:
         try:
             step = SensorStep(inputs, step_limits(self, self.sensor), self.sensor, rng=rng)

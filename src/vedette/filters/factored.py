@@ -18,13 +18,7 @@ from vedette.filters.inputs import born_at, check_new, no_births_for_kernel
 from vedette.filters.limits import Limits
 from vedette.filters.multi_sensor import MultiSensorFilter, SequentialUpdate
 from vedette.filters.protocols import FilterInfo
-from vedette.filters.region_births import (
-    arrivals_of,
-    region_births,
-    with_cells,
-    with_deaths,
-    with_learnt_rate,
-)
+from vedette.filters.region_births import arrivals_of, region_births, with_cells, with_deaths, with_learnt_rate
 from vedette.filters.undetected import (
     SplitBirths,
     after_scan,

@@ -123,12 +123,7 @@ class PlanningSensorManager(SensorManager):  # type: ignore[misc] # Stone Soup i
         self._rng = np.random.default_rng(self.seed)
 
     def choose_actions(
-        self,
-        tracks: Any,
-        timestamp: datetime.datetime,
-        nchoose: int = 1,
-        return_reward: bool = False,
-        **kwargs: Any,
+        self, tracks: Any, timestamp: datetime.datetime, nchoose: int = 1, return_reward: bool = False, **kwargs: Any
     ) -> Any:
         """Return the actions until `timestamp`, in the form of other sensor managers; `plan` has the plan behind them.
 

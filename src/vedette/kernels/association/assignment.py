@@ -33,13 +33,16 @@ class Options(NamedTuple):
     num_measurements: int  # of the scan
 
 
-@kernel
-def with_options(
+def _with_options(
     options: Options, offsets: Ints, columns: Ints, log_weights: Floats, entries: Ints, num_measurements: int
 ) -> Options:
     """Return other options of the same components."""
     whitened, updated, marks, weights = options.whitened, options.updated, options.marks, options.component_log_weights
     return Options(offsets, columns, log_weights, entries, weights, whitened, updated, marks, num_measurements)
+
+
+with_options = kernel(_with_options)
+borrowed_options = inlined(_with_options)  # for kernels that only borrow arrays
 
 
 class DualWork(NamedTuple):

@@ -14,14 +14,7 @@ from typing import NamedTuple
 import numpy as np
 
 from vedette.kernels.association.assignment import ABSENT, Options, make_dual_work, solve_assignment, with_options
-from vedette.kernels.association.children import (
-    Children,
-    Parents,
-    append_child,
-    grown_children,
-    is_full,
-    widest_parent,
-)
+from vedette.kernels.association.children import Children, Parents, append_child, grown_children, is_full, widest_parent
 from vedette.kernels.base.arrays import filled_ints
 from vedette.kernels.base.compile import kernel
 from vedette.kernels.base.types import Floats, Ints

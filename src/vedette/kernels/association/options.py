@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from vedette.errors import ModelError
-from vedette.kernels.association.assignment import ABSENT, MISSED, Options
+from vedette.kernels.association.assignment import ABSENT, MISSED, Options, borrowed_options
 from vedette.kernels.association.gating import Near, near_measurements
 from vedette.kernels.association.predicted import Rows, log_or_minus_inf
 from vedette.kernels.association.truncation import Truncation
@@ -42,25 +42,19 @@ def make_options(num_rows: int, num_components: int, num_measurements: int, stat
 
 @kernel
 def make_room(
-    num_rows: int,
-    most_options: int,
-    most_entries: int,
-    num_measurements: int,
-    meas_dim: int,
-    updated: Floats,
-    marks: Marks,
+    num_rows: int, num_options: int, num_entries: int, num_columns: int, meas_dim: int, updated: Floats, marks: Marks
 ) -> Options:
-    """Return arrays for this number of options and entries. updated, marks: as in `Options`."""
+    """Return arrays for this number of options, entries and measurements. updated, marks: as in `Options`."""
     return Options(
         np.zeros(num_rows + 1, np.int64),
-        np.empty(most_options, np.int64),
-        np.empty(most_options),
-        np.empty(most_options, np.int64),
-        np.empty(most_entries),
-        np.empty((most_entries, meas_dim)),
+        np.empty(num_options, np.int64),
+        np.empty(num_options),
+        np.empty(num_options, np.int64),
+        np.empty(num_entries),
+        np.empty((num_entries, meas_dim)),
         updated,
         marks,
-        num_measurements,
+        num_columns,
     )
 
 
@@ -88,17 +82,8 @@ def room_for_updated(rows: Rows, num_entries: int) -> Floats:
 @inlined
 def view_options(options: Options, num_rows: int, num_measurements: int) -> Options:
     """Return arrays for the options of fewer rows and measurements."""
-    return Options(
-        options.offsets[: num_rows + 1],
-        options.columns,
-        options.log_weights,
-        options.entries,
-        options.component_log_weights,
-        options.whitened,
-        options.updated,
-        options.marks,
-        num_measurements,
-    )
+    offsets, columns, log_weights = options.offsets[: num_rows + 1], options.columns, options.log_weights
+    return borrowed_options(options, offsets, columns, log_weights, options.entries, num_measurements)
 
 
 @inlined

@@ -90,10 +90,7 @@ def pool_marks(marks: Marks, chosen: Ints, powers: Floats, count: int, out: Mark
 
 @inlined
 def update_marks(marks: Marks, c: int, measurement: Floats, meas_dim: int, out: Marks, target: int) -> float:
-    """Write the marks of component `c` after a measurement; return the log of the factor of its weight.
-
-    marks: with as many classes as the measurement has likelihood ratios of them, or the measurement has none.
-    """
+    """Write the marks of component `c` after a measurement; return the log of the factor of its weight."""
     if out.log_class_probs.shape[1] == 0:
         return 0.0
     first = row_length(meas_dim)

@@ -31,9 +31,7 @@ def row_length(meas_dim: int) -> int:
 def largest_class_ratio(measurement: Floats, meas_dim: int) -> float:
     """Return the largest log likelihood ratio of a class, a bound on the factor of any component; 0 without any."""
     first = row_length(meas_dim)
-    if measurement.shape[0] <= first:
-        return 0.0
-    largest = -math.inf
+    largest = -math.inf if measurement.shape[0] > first else 0.0
     for place in range(first, measurement.shape[0]):
         largest = max(largest, measurement[place])
     return largest
