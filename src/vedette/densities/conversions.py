@@ -69,7 +69,7 @@ def marginalise(
 
 
 def marginalised_factors(density: FactoredGLMB, caps: MixtureCaps) -> FactoredGLMB:
-    """Return the density with every factor marginalised, in order; factors of an LMB keep that form."""
+    """Return the density with every factor marginalised, in order; those in the form of an LMB keep it."""
     bernoulli = density.is_bernoulli
     if bernoulli.all() and len(density.tracks.log_weights) == density.num_factors:
         return density

@@ -232,7 +232,7 @@ def sets_of_factors(hypotheses: kt.Glmb, factor_of: Ints) -> tuple[Ints, Ints]:
 
 
 def bernoulli_factors(density: kt.FactoredGlmb) -> Bools:
-    """Mask (num_factors,) of the factors of one label as of an LMB: absent, then present."""
+    """Mask (num_factors,) of the factors of one label in the form of an LMB: absent, then present."""
     tracks, factors, hyps = density.track_offsets, density.factor_offsets, density.hyp_offsets
     alone = np.flatnonzero((tracks[1:] - tracks[:-1] == 1) & (factors[1:] - factors[:-1] == 2))
     first, found = factors[alone], np.zeros(len(factors) - 1, np.bool_)

@@ -130,7 +130,7 @@ class _FactoredFilterBase(LabelledFilterBase[FactoredGLMB]):
         )
         if undetected is not None:
             undetected = after_scan(undetected, missed, left, len(scan.measurements))
-        return prior._replace(density=density, undetected=undetected), report
+        return _Before(density, undetected, prior.arrivals, prior.error), report
 
     def _check(self, posterior: Any, report: FactoredReport, place: str) -> float:
         if report.log_total > -math.inf:
@@ -219,7 +219,9 @@ class FactoredGlmbFilter(_FactoredFilterBase, LabelledFilter[FactoredGLMB]):
         return replace(self, sensor=blind_sensor(), limits=self.limits.keeping_labels())
 
     def _run_kernel(self, prior: _Before, step: SensorStep) -> tuple[_Before, FactoredReport]:
-        return _FactoredFilterBase._run_kernel(self, prior, step._replace(num_scans=self.scans_together))
+        if step.num_scans != self.scans_together:
+            step = step._replace(num_scans=self.scans_together)
+        return _FactoredFilterBase._run_kernel(self, prior, step)
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)

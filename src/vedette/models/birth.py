@@ -159,7 +159,7 @@ class BirthModel:
 
     @property
     def marks(self) -> Marks:
-        """Marks of a birth, as of one component."""
+        """Marks of the component of a birth."""
         none = unmarked(1)
         return none if self.class_probs is None else none._replace(log_class_probs=np.log([self.class_probs]))
 

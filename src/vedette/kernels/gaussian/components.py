@@ -77,9 +77,10 @@ def borrowed_components(mixture: Mixture, num: int) -> Mixture:
 @kernel
 def own_components(mixture: Mixture, num: int) -> Mixture:
     """The first `num` components in arrays of their own."""
-    out = components_like(mixture, num)
-    copy_components(mixture, 0, num, out, 0)
-    return out
+    marks = marks_like(mixture.marks, num)
+    for c in range(num):
+        copy_marks(mixture.marks, c, marks, c)
+    return Mixture(mixture.log_weights[:num].copy(), mixture.means[:num].copy(), mixture.covs[:num].copy(), marks)
 
 
 @kernel
