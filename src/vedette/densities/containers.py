@@ -176,5 +176,5 @@ def _held(value: Any) -> Any:
         return value
     else:  # a part of another array, whose base has another shape
         view = np.array(value, order="C").view()
-    view.setflags(False)  # three times as fast as by keyword or attribute
+    view.setflags(False)  # type: ignore[call-arg]  # three times as fast as by keyword or attribute
     return view
