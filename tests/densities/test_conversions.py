@@ -239,7 +239,8 @@ def test_densities_of_no_target():
 def test_conversions_leave_their_input_alone(limits):
     glmb = random_glmb(np.random.default_rng(1), 4, 12, 3)
     tracks, *hypotheses = glmb.to_kernel()
-    arrays = tracks.labels, tracks.offsets, *tracks.components, *hypotheses
+    *columns, marks = tracks.components
+    arrays = tracks.labels, tracks.offsets, *columns, *marks, *hypotheses
     before = [array.copy() for array in arrays]
     marginalise(glmb, **limits)
     as_glmb(as_lmb(glmb, **limits), max_hypotheses=5)

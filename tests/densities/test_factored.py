@@ -92,9 +92,7 @@ def test_the_heaviest_products_are_kept(density, most):
 
 
 def test_products_of_no_weight_are_not_listed():
-    certain = FactoredGLMB.from_lmb(
-        LMB.from_bernoullis([[0, 1], [0, 2]], [1.0, 0.0], np.zeros((2, 2)), [np.eye(2)] * 2)
-    )
+    certain = FactoredGLMB.of(LMB.from_bernoullis([[0, 1], [0, 2]], [1.0, 0.0], np.zeros((2, 2)), [np.eye(2)] * 2))
     glmb, discarded = as_glmb(certain, max_hypotheses=ALL)
     assert glmb.num_hyps == 1
     assert discarded == 0.0
@@ -131,7 +129,7 @@ def test_the_lmb_is_that_of_all_combinations(density, caps):
 
 @given(lmbs())
 def test_an_lmb_comes_back(lmb):
-    density = FactoredGLMB.from_lmb(lmb)
+    density = FactoredGLMB.of(lmb)
     density.validate()
     assert density.is_bernoulli.all()
     _same_lmb(as_lmb(density), lmb)
@@ -172,14 +170,14 @@ def test_ties_of_a_map_estimate_go_as_for_an_lmb():
     labels = [[0, i] for i in (4, 2, 9, 1)]
     lmb = LMB.from_bernoullis(labels, [0.5] * 4, np.zeros((4, 2)), [np.eye(2)] * 4)
     places = np.array([3, 1, 0, 2])
-    density = take_factors(FactoredGLMB.from_lmb(lmb), places)
+    density = take_factors(FactoredGLMB.of(lmb), places)
     np.testing.assert_array_equal(map_estimate(density).labels, map_estimate(lmb).labels)
 
 
 def test_certain_and_impossible_targets_are_estimated():
     labels = [[0, 1], [0, 2], [0, 3]]
     lmb = LMB.from_bernoullis(labels, [1.0, 0.0, 1.0], np.zeros((3, 2)), [np.eye(2)] * 3)
-    assert map_estimate(FactoredGLMB.from_lmb(lmb)).labels.tolist() == [[0, 1], [0, 3]]
+    assert map_estimate(FactoredGLMB.of(lmb)).labels.tolist() == [[0, 1], [0, 3]]
 
 
 @given(factoreds(3), st.sampled_from([0.0, 0.5, 0.9]))
@@ -293,6 +291,6 @@ def test_a_fault_is_told_with_its_factor():
         with pytest.raises(InputError, match=message):
             replace(density, **{name: array})
     with pytest.raises(InputError, match=r"tracks.labels: expected each label in one factor; got \[.*\] in \[0, 1\]"):
-        FactoredGLMB.product([FactoredGLMB.from_lmb(random_lmb(np.random.default_rng(3), 1))] * 2, 2)
+        FactoredGLMB.product([FactoredGLMB.of(random_lmb(np.random.default_rng(3), 1))] * 2, 2)
     with pytest.raises(InputError, match=r"factors\[0\]: expected a GLMB"):
         FactoredGLMB.from_factors([random_lmb(np.random.default_rng(3), 1)], 2)  # type: ignore[list-item]

@@ -127,7 +127,7 @@ def test_a_target_without_a_probable_place_is_not_reported():
 
 
 def test_a_large_cutoff_leaves_the_marginal_estimate_of_half():
-    density = FactoredGLMB.from_lmb(candidates([0.9, 0.49, 0.51, 0.2]))
+    density = FactoredGLMB.of(candidates([0.9, 0.49, 0.51, 0.2]))
     for order in (1.0, 2.0, 50.0):
         found = least_gospa_estimate(density, 1e6, order)
         assert labels_of(found) == labels_of(marginal_estimate(density)) == [(1, 0), (1, 2)]
@@ -145,7 +145,7 @@ def test_two_labels_of_one_target_are_one():
 def test_all_kinds_with_labels_give_the_same():
     lmb = candidates([0.9, 0.4, 0.2, 0.7])
     other = least_gospa_estimate(lmb)
-    for density in (FactoredGLMB.from_lmb(lmb), as_glmb(lmb, max_hypotheses=100)[0]):
+    for density in (FactoredGLMB.of(lmb), as_glmb(lmb, max_hypotheses=100)[0]):
         found = least_gospa_estimate(density)
         assert labels_of(found) == labels_of(other) == [(1, 0), (1, 3)]
         np.testing.assert_allclose(found.existence, other.existence, atol=1e-12)

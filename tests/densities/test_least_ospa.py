@@ -67,7 +67,7 @@ def test_no_number_of_targets_has_a_larger_mean_share(sizes):
 
 
 def test_unrelated_candidates_are_not_shown_because_there_are_many():
-    density = FactoredGLMB.from_lmb(candidates([0.11] * 9))
+    density = FactoredGLMB.of(candidates([0.11] * 9))
     assert len(map_estimate(density)) == 1
     assert len(least_ospa_estimate(density)) == 0
     assert len(best_estimate(density, 1)) == 0
@@ -86,7 +86,7 @@ def test_one_candidate_is_shown_where_it_rather_exists(probability):
 
 
 def test_probable_targets_are_shown_where_the_most_probable_number_leaves_some_out():
-    density = FactoredGLMB.from_lmb(candidates([0.6] * 6))
+    density = FactoredGLMB.of(candidates([0.6] * 6))
     assert len(map_estimate(density)) == 4
     assert len(least_ospa_estimate(density)) == 6
 
@@ -94,8 +94,7 @@ def test_probable_targets_are_shown_where_the_most_probable_number_leaves_some_o
 def test_all_kinds_with_labels_give_the_same():
     lmb = candidates([0.9, 0.4, 0.2, 0.7], apart=1.5)
     found = [
-        least_ospa_estimate(density)
-        for density in (lmb, FactoredGLMB.from_lmb(lmb), as_glmb(lmb, max_hypotheses=100)[0])
+        least_ospa_estimate(density) for density in (lmb, FactoredGLMB.of(lmb), as_glmb(lmb, max_hypotheses=100)[0])
     ]
     for other in found[1:]:
         assert labels_of(other) == labels_of(found[0])

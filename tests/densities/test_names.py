@@ -69,7 +69,7 @@ def test_factors_are_settled_each_by_itself(density):
 @given(lmbs())
 def test_an_lmb_has_no_open_names(lmb):
     assert resolve_labels(lmb) is lmb
-    _same(plain_lmb(resolve_labels(FactoredGLMB.from_lmb(lmb), **_ALL)), plain_lmb(lmb))
+    _same(plain_lmb(resolve_labels(FactoredGLMB.of(lmb), **_ALL)), plain_lmb(lmb))
 
 
 @given(factoreds())
@@ -93,7 +93,7 @@ def test_one_target_with_two_names_is_one_target():
 
 def test_two_targets_that_may_be_swapped_stand_in_two_places():
     tracks = _tracks([[0, 0], [1, 0], [0, 0], [1, 0]], [0, 100, 100, 0])
-    density = FactoredGLMB.from_glmb(GLMB.from_hypotheses(tracks, [[0, 1], [2, 3]], [0.4, 0.6]))
+    density = FactoredGLMB.of(GLMB.from_hypotheses(tracks, [[0, 1], [2, 3]], [0.4, 0.6]))
     lmb = resolve_labels(density)
     assert lmb.existence == pytest.approx([1.0, 1.0])
     assert lmb.tracks.means.ravel() == pytest.approx([100.0, 0.0])

@@ -5,6 +5,7 @@ from __future__ import annotations
 import copy
 import pickle
 from dataclasses import replace
+from operator import attrgetter
 from typing import Any
 
 import numpy as np
@@ -12,7 +13,7 @@ import pytest
 
 from densities.examples import random_glmb, random_lmb
 from filters.examples import linear_scene
-from vedette.densities import GLMB, LMB, FactoredGLMB, IidCluster, MultiBernoulli, Poisson, TrackTable
+from vedette.densities import GLMB, LMB, FactoredGLMB, IidCluster, Marks, MultiBernoulli, Poisson, TrackTable
 from vedette.densities.containers import for_kernel, unchecked
 from vedette.errors import InputError
 from vedette.filters import DeltaGlmbFilter, LmbFilter
@@ -30,7 +31,7 @@ def densities() -> list[Any]:
         replace(TRACKS, sources=np.array([[-1, -2], [3, 0]])),
         glmb,
         lmb,
-        FactoredGLMB.from_lmb(lmb),
+        FactoredGLMB.of(lmb),
         MultiBernoulli(lmb.existence_logit, TRACKS.offsets, *ONE_EACH),
         Poisson(*ONE_EACH),
         IidCluster(np.log([0.5, 0.5]), np.log([0.5, 0.5]), *ONE_EACH[1:]),
@@ -38,7 +39,8 @@ def densities() -> list[Any]:
 
 
 def arrays(density: Any) -> dict[str, Any]:
-    found = {name: getattr(density, name) for name in density.__match_args__}
+    marks = [f"marks.{name}" for name in Marks._fields] if hasattr(density, "marks") else []
+    found = {name: attrgetter(name)(density) for name in (*density.__match_args__, *marks)}
     return {name: value for name, value in found.items() if isinstance(value, np.ndarray)}
 
 
@@ -56,7 +58,9 @@ def bundled(bundle: Any) -> list[Any]:
 def test_nobody_else_can_write_to_a_density(density: Any) -> None:
     for name, array in arrays(density).items():
         given = array.copy()
-        held = getattr(replace(density, **{name: given}), name)
+        field, _, column = name.partition(".")
+        value = getattr(density, field)._replace(**{column: given}) if column else given
+        held = attrgetter(name)(replace(density, **{field: value}))
         assert not held.flags.writeable
         assert not np.shares_memory(held, given)
         with pytest.raises(ValueError, match="read-only"):
@@ -68,8 +72,8 @@ def test_nobody_else_can_write_to_a_density(density: Any) -> None:
 def test_pickled_and_copied_it_is_the_same_and_its_own(density: Any, protocol: int) -> None:
     for made in (pickle.loads(pickle.dumps(density, protocol)), copy.deepcopy(density), copy.copy(density)):
         for name, array in arrays(density).items():
-            np.testing.assert_array_equal(getattr(made, name), array)
-            assert not getattr(made, name).flags.writeable
+            np.testing.assert_array_equal(attrgetter(name)(made), array)
+            assert not attrgetter(name)(made).flags.writeable
         assert all(array.flags.writeable and array.flags.c_contiguous for array in bundled(made.to_kernel()))
 
 
@@ -112,7 +116,7 @@ def test_parts_of_a_density_are_arrays_of_their_own() -> None:
     """A factor is cut out of larger arrays, whose bases are not of its shape."""
     rng = np.random.default_rng(3)
     factored = FactoredGLMB.from_factors([random_glmb(rng, 2, 4, 1)], 2)
-    for factor in (*factored.factors, *FactoredGLMB.from_lmb(random_lmb(rng, 3)).factors):
+    for factor in (*factored.factors, *FactoredGLMB.of(random_lmb(rng, 3)).factors):
         factor.validate()
         for name, array in arrays(factor).items():
             np.testing.assert_array_equal(for_kernel(array), array, err_msg=name)

@@ -13,6 +13,7 @@ from vedette.densities import (
     LMB,
     FactoredGLMB,
     IidCluster,
+    Marks,
     MultiBernoulli,
     Poisson,
     cardinality_distribution,
@@ -133,7 +134,7 @@ def believed(kind: Any, existence: float, means: Any, covs: Any) -> Any:
         hyps = [(range(num), existence), ([], 1.0 - existence)]
         kept = [hyp for hyp in hyps if hyp[1] > 0.0]
         return GLMB.from_hypotheses(lmb.tracks, [labels for labels, _ in kept], [weight for _, weight in kept])
-    return FactoredGLMB.from_lmb(lmb) if container is FactoredGLMB else lmb
+    return FactoredGLMB.of(lmb) if container is FactoredGLMB else lmb
 
 
 def components(belief: Any) -> tuple[Any, Any, Any]:
@@ -151,4 +152,5 @@ def arrays(belief: Any) -> list[Any]:
     if undetected is not None:
         own += [*undetected.intensity.to_kernel(), np.array(undetected.next_label)]
         own += [] if undetected.cells is None else [undetected.cells.expected]
-    return [array for array in (*own, *(getattr(belief, name) for name in names)) if array is not None]
+    parts = [part for part in (*own, *(getattr(belief, name) for name in names)) if part is not None]
+    return [array for part in parts for array in (part if isinstance(part, Marks) else [part])]

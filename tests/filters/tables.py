@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 
 from vedette.kernels.association.assignment import ABSENT, MISSED, Options
 from vedette.kernels.association.children import Parents
+from vedette.kernels.gaussian.marks import unmarked
 
 
 def make_options(rows: list[list[tuple[int, float]]], num_measurements: int) -> Options:
@@ -25,7 +26,7 @@ def make_options(rows: list[list[tuple[int, float]]], num_measurements: int) -> 
         np.zeros(1),
         np.zeros((1, 1)),
         np.empty((0, 0, 0)),
-        np.empty((0, 0)),
+        unmarked(0),
         num_measurements,
     )
 

@@ -210,7 +210,7 @@ def test_a_belief_that_is_no_density(kind: Any) -> None:
     tracks = gaussian_tracks(np.zeros((1, 2), np.int64), np.zeros((1, 4)), -AT_SITE[1])
     glmb = unchecked(GLMB, tracks, np.arange(2), np.zeros(1, np.int64), np.zeros(1))
     lmb = unchecked(LMB, tracks, np.zeros(1))
-    belief = {DeltaGlmbFilter: glmb, LmbFilter: lmb}.get(kind, FactoredGLMB.from_lmb(lmb))
+    belief = {DeltaGlmbFilter: glmb, LmbFilter: lmb}.get(kind, FactoredGLMB.of(lmb))
     tracker = make(kind, motion=models.constant_velocity(1.0, method="ukf"))
     with pytest.raises(NumericalError, match="covariance of a track is not positive definite"):
         step(tracker, belief=belief, number=2)

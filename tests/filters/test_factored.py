@@ -115,7 +115,7 @@ def random_prior(rng: np.random.Generator) -> FactoredGLMB:
         rng.normal(size=(num, 4)) * [70.0, 70.0, 3.0, 3.0],
         np.stack([np.diag(rng.uniform([5.0, 5.0, 1.0, 1.0], [30.0, 30.0, 5.0, 5.0])) ** 2 for _ in range(num)]),
     )
-    factors = list(FactoredGLMB.from_lmb(singles).factors)
+    factors = list(FactoredGLMB.of(singles).factors)
     if rng.random() < 0.5:
         tracks = TrackTable.from_gaussians(
             [[-2, 0], [-2, 0], [-2, 1]],

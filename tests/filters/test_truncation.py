@@ -56,7 +56,7 @@ def test_nothing_is_stated_as_cut_off_where_nothing_was(kind, num):
     tracks = TrackTable.from_gaussians([[-1, i] for i in range(num)], np.zeros((num, 4)), covs)
     whole, scan = GLMB.from_hypotheses(tracks, [list(range(num))], [1.0]), 3.0 * np.arange(2.0 * num).reshape(num, 2)
     known = scene.glmb_filter()
-    belief: Any = FactoredGLMB.from_glmb(whole) if kind is FactoredGlmbFilter else whole
+    belief: Any = FactoredGLMB.of(whole) if kind is FactoredGlmbFilter else whole
     tracker = kind(known.targets, known.sensor, Limits.none())
     _, info = tracker.step(belief, scan, scene.pose, DT, 9, rng=np.random.default_rng(0))
     assert info.truncation_error_bound == 0.0

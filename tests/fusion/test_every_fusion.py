@@ -55,7 +55,7 @@ def of_labels(name: str, existences: dict[Any, float], rng: np.random.Generator)
     own = lmb(tuple(existences), tuple(existences.values()), rng)
     if name == "cm":
         return as_glmb(own, max_hypotheses=100)[0]
-    return FactoredGLMB.from_lmb(own) if name == "cm of factors" else own
+    return FactoredGLMB.of(own) if name == "cm of factors" else own
 
 
 def plain(belief: Any) -> reference.Glmb:

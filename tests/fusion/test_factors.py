@@ -191,8 +191,7 @@ def test_nobody_and_nowhere():
     fused.validate()
     assert (fused.num_factors, info.num_sets, info.empty_intersection) == (0, 0, False)
     certain = [
-        FactoredGLMB.from_lmb(LMB.from_bernoullis([A], [1.0], [[place, 0.0]], [1e-6 * np.eye(2)]))
-        for place in (0.0, 1e200)
+        FactoredGLMB.of(LMB.from_bernoullis([A], [1.0], [[place, 0.0]], [1e-6 * np.eye(2)])) for place in (0.0, 1e200)
     ]
     with pytest.raises(NumericalError):
         CmDeltaGlmb((0.5, 0.5)).fuse(certain)
@@ -236,5 +235,5 @@ def test_labels_are_matched_across_sensors():
     assert isinstance(matched, FactoredGLMB)
     assert_same_glmb(all_of(matched), all_of(first), 1e-12)
     fused, _ = LabelMatchedFusion(CmDeltaGlmb((0.5, 0.5))).fuse([first, second])
-    settled = FactoredGLMB.from_lmb(resolve_labels(first, max_components=10))  # names that are open are not matched
+    settled = FactoredGLMB.of(resolve_labels(first, max_components=10))  # names that are open are not matched
     assert_same_glmb(all_of(fused), all_of(CmDeltaGlmb((0.5, 0.5)).fuse([settled, settled])[0]), 1e-9)

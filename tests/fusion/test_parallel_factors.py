@@ -47,7 +47,7 @@ def one_of_two(weights: Any, apart: float = 15.0) -> FactoredGLMB:
     """Two labels in one factor: neither, the first, the second, both."""
     means = [[0.0, 0.0, 1.0, 0.0], [apart, 0.0, -1.0, 0.0]]
     tracks = TrackTable.from_gaussians([(1, 0), (1, 1)], means, [COV, 1.5 * COV])
-    return FactoredGLMB.from_glmb(GLMB.from_hypotheses(tracks, [[], [0], [1], [0, 1]], weights))
+    return FactoredGLMB.of(GLMB.from_hypotheses(tracks, [[], [0], [1], [0, 1]], weights))
 
 
 def in_turn(prediction: Any, sensors: Any, scans: Any) -> FactoredGLMB:
@@ -95,7 +95,7 @@ def test_a_label_seen_among_clutter_is_as_after_updates_in_turn(seed: int) -> No
     for own, scan in zip(sensors, scans, strict=True):
         filter_ = LmbFilter(TARGETS, own, Limits.none())
         belief, _ = filter_.update(belief, scan, POSE, rng=RNG)
-        posteriors.append(FactoredGLMB.from_lmb(filter_.update(prediction, scan, POSE, rng=RNG)[0]))
+        posteriors.append(FactoredGLMB.of(filter_.update(prediction, scan, POSE, rng=RNG)[0]))
     fused, _ = ParallelUpdate().fuse(posteriors, views(sensors, prediction))
     for found, wanted in zip(moments(fused), moments(belief), strict=True):
         np.testing.assert_allclose(found, wanted, rtol=1e-3, atol=1e-3 * np.abs(wanted).max())
@@ -106,9 +106,9 @@ def test_two_labels_of_one_target_stay_one_where_lmbs_lose_both() -> None:
     means = np.array([[0.0, 0.0, 1.0, 0.0], [4.0, 0.0, 1.0, 0.0]])
     lmb = LMB.from_bernoullis([(1, 0), (1, 1)], [0.9, 0.9], means, [COV, COV])
     sensors, scans = [sensor()] * 5, [np.array([[2.0, 0.0]])] * 5
-    exact = existence_probabilities(in_turn(FactoredGLMB.from_lmb(lmb), sensors, scans))[1]
+    exact = existence_probabilities(in_turn(FactoredGLMB.of(lmb), sensors, scans))[1]
     for split in (0.0, 0.7 / 5):
-        fused = in_parallel(FactoredGLMB.from_lmb(lmb), sensors, scans, split)
+        fused = in_parallel(FactoredGLMB.of(lmb), sensors, scans, split)
         np.testing.assert_allclose(existence_probabilities(fused)[1], exact, atol=0.01)
     assert exact.sum() == pytest.approx(1.0, abs=0.01)
     posterior, _ = LmbFilter(TARGETS, sensors[0], Limits.none()).update(lmb, scans[0], POSE, rng=RNG)
@@ -124,7 +124,7 @@ def test_who_sees_nothing_says_nothing_however_its_posterior_is_factored() -> No
         filter_of(own).update(prediction, scan, POSE, rng=RNG)[0]
         for own, scan in zip([sensor(), sensor(0.9)], scans, strict=True)
     ]
-    apart = FactoredGLMB.from_lmb(as_lmb(prediction))
+    apart = FactoredGLMB.of(as_lmb(prediction))
     for blind in (prediction, apart):
         fused, info = ParallelUpdate().fuse([*told, *[blind] * 14], views([sensor()] * 16, prediction))
         for found, wanted in zip(moments(fused), moments(expected), strict=True):
@@ -143,7 +143,7 @@ def test_labels_far_from_all_others_are_those_of_lmbs() -> None:
         posteriors.append(LmbFilter(TARGETS, own, limits).update(lmb, scan, POSE, rng=RNG)[0])
     expected, told = ParallelUpdate().fuse(posteriors, views(sensors, lmb))
     fused, info = ParallelUpdate().fuse(
-        [FactoredGLMB.from_lmb(own) for own in posteriors], views(sensors, FactoredGLMB.from_lmb(lmb))
+        [FactoredGLMB.of(own) for own in posteriors], views(sensors, FactoredGLMB.of(lmb))
     )
     for found, wanted in zip(moments(fused), moments(expected), strict=True):
         np.testing.assert_allclose(found, wanted, rtol=1e-12)
@@ -153,7 +153,7 @@ def test_labels_far_from_all_others_are_those_of_lmbs() -> None:
 def test_a_label_dropped_by_a_posterior_counts_as_in_lmbs() -> None:
     prediction = one_of_two(np.array([0.1, 0.4, 0.4, 0.1]))
     kept, _ = filter_of(sensor()).update(prediction, np.array([[1.0, 1.0]]), POSE, rng=RNG)
-    fewer = FactoredGLMB.from_glmb(
+    fewer = FactoredGLMB.of(
         GLMB.from_hypotheses(TrackTable.from_gaussians([(1, 0)], [[0.0, 0.0, 1.0, 0.0]], [COV]), [[], [0]], [0.5, 0.5])
     )
     fused, info = ParallelUpdate(missing_existence=1e-3).fuse([kept, fewer], views([sensor()] * 2, prediction))
@@ -167,7 +167,7 @@ def test_a_label_dropped_by_a_posterior_counts_as_in_lmbs() -> None:
 def test_what_cannot_be_divided_is_refused() -> None:
     prediction = one_of_two(np.array([0.1, 0.4, 0.4, 0.1]))
     tracks = TrackTable.from_gaussians([(1, 0), (1, 0)], [[0.0] * 4, [9.0, 0.0, 0.0, 0.0]], [COV] * 2)
-    versions = FactoredGLMB.from_glmb(GLMB.from_hypotheses(tracks, [[0], [1]], [0.5, 0.5]))
+    versions = FactoredGLMB.of(GLMB.from_hypotheses(tracks, [[0], [1]], [0.5, 0.5]))
     with pytest.raises(InputError, match=r"views.prediction: expected one Gaussian for each of its 1 labels.*got 2"):
         ParallelUpdate().fuse([versions], views([sensor()], versions))
     with pytest.raises(InputError, match=r"beliefs\[1\]: expected labels of views.prediction.*got \[1, 0\]"):

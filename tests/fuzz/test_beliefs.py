@@ -132,7 +132,7 @@ def one_product(rng: np.random.Generator) -> None:
     tracks = d.TrackTable.from_gaussians([(1, 0), (1, 1), (1, 1), (2, 0)], means[:4], covs[:4])
     several = d.GLMB.from_hypotheses(tracks, [[0, 1], [2, 3], [0], []], [0.4, 0.3, 0.2, 0.1])
     alone = d.LMB.from_bernoullis([(1, 5), (3, 0)], [0.9, 0.2], means[4:], covs[4:])
-    belief = d.FactoredGLMB.product([d.FactoredGLMB.from_lmb(alone), d.FactoredGLMB.from_glmb(several)], 4)
+    belief = d.FactoredGLMB.product([d.FactoredGLMB.of(alone), d.FactoredGLMB.of(several)], 4)
     try:
         if rng.random() < 0.3:
             made = d.TrackTable(**spoil(fields_of(belief.tracks), rng))

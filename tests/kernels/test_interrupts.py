@@ -12,6 +12,7 @@ import pytest
 
 from vedette.kernels.base.compile import JIT_ENABLED, kernel
 from vedette.kernels.base.types import Mixture
+from vedette.kernels.gaussian.marks import no_marks
 from waiting import PATIENCE
 
 pytestmark = pytest.mark.skipif(not JIT_ENABLED, reason="nothing is compiled")
@@ -84,7 +85,7 @@ def test_every_interrupt_is_a_keyboard_interrupt(tmp_path: Path, num: int) -> No
 
 @kernel
 def _pair(values: np.ndarray) -> tuple[Mixture, int]:
-    return Mixture(values, values.reshape(1, -1).copy(), np.zeros((1, 1, 1)), np.zeros((1, 0))), len(values)
+    return Mixture(values, values.reshape(1, -1).copy(), np.zeros((1, 1, 1)), no_marks(1)), len(values)
 
 
 def test_what_a_kernel_returns_has_its_names() -> None:
@@ -112,7 +113,7 @@ def test_numba_goes_on_as_it_is_for_others() -> None:
 
     @njit
     def own(values: np.ndarray) -> Mixture:
-        return Mixture(values, np.zeros((1, 1)), np.zeros((1, 1, 1)), np.zeros((1, 0)))
+        return Mixture(values, np.zeros((1, 1)), np.zeros((1, 1, 1)), no_marks(1))
 
     _pair(np.zeros(1))
     assert isinstance(own(np.zeros(1)), Mixture)

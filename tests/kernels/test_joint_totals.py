@@ -10,6 +10,7 @@ import pytest
 from vedette.kernels.association.assignment import Options
 from vedette.kernels.association.joint_totals import MAX_CONTESTED, log_contested_share, make_total_work
 from vedette.kernels.association.totals import log_row_totals
+from vedette.kernels.gaussian.marks import unmarked
 
 
 def _options(rng: np.random.Generator, num_rows: int, num_measurements: int) -> Options:
@@ -34,7 +35,7 @@ def _as_options(offsets: list[int], columns: list[int], log_weights: list[float]
         none,
         none.reshape(0, 2),
         none.reshape(0, 5, 4),
-        none.reshape(0, 0),
+        unmarked(0),
         num_measurements,
     )
 

@@ -16,7 +16,7 @@ from vedette.tracking import State
 NUM_LABELS = 3
 FILTERS = {
     "lmb": lambda lmb: lmb,
-    "factored_glmb": FactoredGLMB.from_lmb,
+    "factored_glmb": FactoredGLMB.of,
     "delta_glmb": lambda lmb: as_glmb(lmb, max_hypotheses=2**NUM_LABELS)[0],
     "m_delta_glmb": lambda lmb: as_glmb(lmb, max_hypotheses=2**NUM_LABELS)[0],
 }
@@ -85,7 +85,7 @@ def test_the_expected_loss_is_the_same_under_any_fusion_and_filter(fusion: str) 
 def test_ambiguous_labels_are_resolved_before_a_decision(filters: str, reward: str) -> None:
     """Not half way between the two places where each may be."""
     settled, swapped = open_names()
-    held = FactoredGLMB.from_glmb(swapped) if filters == "factored_glmb" else swapped
+    held = FactoredGLMB.of(swapped) if filters == "factored_glmb" else swapped
     fields = {"control.reward": {"kind": reward}}
     _, wanted = planned("lmb", "sequential", "jdm", settled, **fields)
     _, plan = planned(filters, "sequential", "jdm", held, **fields)

@@ -32,15 +32,15 @@ def pair() -> GLMB:
 
 def test_bytes_are_those_of_an_lmb_where_labels_are_alone() -> None:
     alone = targets([[1, 0], [1, 1]], [0.6, 0.9])
-    product = FactoredGLMB.from_lmb(alone)
+    product = FactoredGLMB.of(alone)
     assert belief_bytes(product) == belief_bytes(alone)
-    both = FactoredGLMB.product([product, FactoredGLMB.from_glmb(pair())], 4)
+    both = FactoredGLMB.product([product, FactoredGLMB.of(pair())], 4)
     assert belief_bytes(both) == belief_bytes(alone) + belief_bytes(pair())
 
 
 def test_births_match_those_of_the_lmb_filter() -> None:
-    alone = FactoredGLMB.from_lmb(targets([[1, 0], [1, 1]], [0.6, 0.9]))
-    product = FactoredGLMB.product([alone, FactoredGLMB.from_glmb(pair())], 4)
+    alone = FactoredGLMB.of(targets([[1, 0], [1, 1]], [0.6, 0.9]))
+    product = FactoredGLMB.product([alone, FactoredGLMB.of(pair())], 4)
     scan = np.array([[2.0, -1.0], [101.0, 0.0], [302.0, 1.0], [-300.0, 50.0]])
     own: list[LabelledDensity] = [product, as_lmb(product)]
     born, wanted = (

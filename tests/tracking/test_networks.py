@@ -313,7 +313,7 @@ def test_parts_have_the_bytes_of_the_whole(factored: bool) -> None:
     belief: Any = line_of_labels(0, 1, 2)
     if factored:
         pair, _ = as_glmb(line_of_labels(7, 8), max_hypotheses=10)
-        belief = FactoredGLMB.product([FactoredGLMB.from_lmb(belief), FactoredGLMB.from_glmb(pair)], 4)
+        belief = FactoredGLMB.product([FactoredGLMB.of(belief), FactoredGLMB.of(pair)], 4)
     parts = belief_parts(belief)
     assert len(parts) == (4 if factored else 3)
     assert sum(parts.values()) == belief_bytes(belief)

@@ -1,11 +1,6 @@
 """Multi-target densities, labelled and unlabelled, with Gaussian-mixture tracks."""
 
-from vedette.densities.conversions import (
-    as_glmb,
-    as_lmb,
-    marginalise,
-    resolve_labels,
-)
+from vedette.densities.conversions import as_glmb, as_lmb, marginalise, resolve_labels
 from vedette.densities.estimates import (
     Estimate,
     Estimator,
@@ -38,6 +33,7 @@ from vedette.densities.statistics import cardinality_distribution, existence_pro
 from vedette.densities.tracks import TrackTable, mixture_moments, track_moments
 from vedette.densities.undetected import LearntRate, UndetectedIntensity, UndetectedTargets
 from vedette.densities.unlabelled import IidCluster, Poisson
+from vedette.kernels.base.types import Marks
 
 __all__ = [
     "GLMB",
@@ -49,6 +45,7 @@ __all__ = [
     "IidCluster",
     "LabelledDensity",
     "LearntRate",
+    "Marks",
     "MultiBernoulli",
     "MultiTargetSamples",
     "Poisson",

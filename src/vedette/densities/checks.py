@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vedette.errors import InputError, NumericalError, VedetteError
-from vedette.kernels.base.types import Bools, Floats, Ints
+from vedette.kernels.base.types import Bools, Floats, Ints, Marks
 from vedette.models.arguments import as_array
 
 NORMALISATION_TOLERANCE = 1e-9
@@ -165,11 +165,11 @@ def no_classes() -> Floats:
 
 
 def check_components(field: str, density: Any, error: type[VedetteError] = NumericalError) -> None:
-    """Raise unless a density's arrays are weights, moments and class probabilities of components.
+    """Raise unless a density's arrays are weights, moments and marks of components.
 
     Arguments as in `check_mixtures`.
     """
-    log_weights, means, covs, classes = density.log_weights, density.means, density.covs, density.log_class_probs
+    log_weights, means, covs, marks = density.log_weights, density.means, density.covs, density.marks
     check_array(f"{field}means", means, np.float64, (None, None))
     num_components, dim = means.shape
     if dim == 0:
@@ -179,9 +179,13 @@ def check_components(field: str, density: Any, error: type[VedetteError] = Numer
     check_log_weights(f"{field}log_weights", log_weights, error)
     check_finite(f"{field}means", means, error)
     check_covariances(f"{field}covs", covs, error)
-    check_array(f"{field}log_class_probs", classes, np.float64, (num_components, None))
+    if not isinstance(marks, Marks):
+        raise InputError(f"{field}marks: expected Marks; got {type(marks).__name__}")
+    for name, column in zip(Marks._fields, marks, strict=True):
+        check_array(f"{field}marks.{name}", column, np.float64, (num_components, None))
+    classes = marks.log_class_probs
     if classes.size:
-        name, flat = f"{field}log_class_probs", classes.reshape(-1)
+        name, flat = f"{field}marks.log_class_probs", classes.reshape(-1)
         check_log_weights(name, flat, error)
         check_normalised(name, flat, np.arange(num_components + 1) * classes.shape[1], error)
 

@@ -15,8 +15,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vedette.densities.inspection import Targets
+from vedette.errors import InputError, NumericalError, VedetteError
 from vedette.internal.representation import SummaryRepr, TabularRepr
-from vedette.kernels.base.types import Floats
+from vedette.kernels.base.types import Floats, Marks, Mixture
+from vedette.kernels.gaussian.components import components_of
+from vedette.kernels.gaussian.marks import taken_marks, unmarked
+from vedette.models.arguments import no_gaussians
 
 _Made = TypeVar("_Made", bound=SummaryRepr)
 
@@ -33,20 +37,62 @@ class Container(SummaryRepr):
     def _own_arrays(self) -> None:
         """Replace the given arrays by copies; a public constructor calls this before its checks."""
         for name in self.__match_args__:  # type: ignore[attr-defined]
-            value = getattr(self, name)
-            if type(value) is np.ndarray:
-                if name == "log_class_probs" and value.shape[1:] == (0,):  # without classes
-                    value = np.empty((len(self.log_weights), 0))  # type: ignore[attr-defined]
-                object.__setattr__(self, name, _held(np.array(value, order="C")))
+            object.__setattr__(self, name, self._owned(getattr(self, name)))
+
+    def _owned(self, value: Any) -> Any:
+        """Return a read-only copy of an array or of the columns of marks, and anything else as it is."""
+        return _held(np.array(value, order="C")) if type(value) is np.ndarray else value
 
     def with_fields(self, **changed: Any) -> Self:
         """Return a copy with other values of some fields, without checks; see `unchecked`."""
-        names = self.__match_args__  # type: ignore[attr-defined]
-        return unchecked(type(self), *(changed[name] if name in changed else getattr(self, name) for name in names))
+        made = object.__new__(type(self))
+        for name in self.__match_args__:  # type: ignore[attr-defined]
+            object.__setattr__(made, name, _held(changed[name]) if name in changed else getattr(self, name))
+        return made
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Unpickle through the constructor and its checks, as a pickle may come from any source."""
         return type(self), tuple(getattr(self, name) for name in self.__match_args__)  # type: ignore[attr-defined]
+
+
+class Components(Container):
+    """Base of the containers of Gaussian components."""
+
+    __slots__ = ()
+    log_weights: Floats
+    means: Floats
+    covs: Floats
+    marks: Marks
+
+    def __post_init__(self) -> None:
+        self._own_arrays()
+        self.validate(error=InputError)
+
+    @abstractmethod
+    def validate(self, *, error: type[VedetteError] = NumericalError) -> None:
+        """Raise unless the arrays are consistent and form a density."""
+
+    def _owned(self, value: Any) -> Any:
+        """Likewise. A column of marks without width gets a row for each component."""
+        if type(value) is not Marks:
+            return super()._owned(value)
+        none = np.empty((len(self.log_weights), 0))
+        return Marks(*(self._owned(none if np.shape(column)[1:] == (0,) else column) for column in value))
+
+    @property
+    def state_dim(self) -> int:
+        """Length of a target's state."""
+        return int(self.means.shape[1])
+
+    @property
+    def num_classes(self) -> int:
+        """Number of classes of targets; 0 if they have none."""
+        return int(self.marks.log_class_probs.shape[1])
+
+    def _components(self) -> Mixture:
+        """Return the components as a kernel bundle."""
+        found = _COMPONENTS(self)
+        return Mixture(found[0], found[1], found[2], Marks._make(found[3:]))  # faster than by star
 
 
 class MultiTarget(Container, TabularRepr):
@@ -79,11 +125,6 @@ class MultiTarget(Container, TabularRepr):
     def _detail(self) -> str:
         return self._targets().in_words()
 
-    @property
-    @abstractmethod
-    def state_dim(self) -> int:
-        """Length of a target's state."""
-
     @abstractmethod
     def cardinality(self) -> Floats:
         """Return the probabilities of 0, 1, ..., n targets; see `vedette.densities.cardinality_distribution`."""
@@ -94,15 +135,14 @@ def unchecked(container: type[_Made], *fields: Any) -> _Made:
 
     The arrays are used as they are: no caller of the library may hold them.
     """
-    made = object.__new__(container)
+    made, put, array = object.__new__(container), object.__setattr__, np.ndarray
     for name, value in zip(container.__match_args__, fields, strict=True):  # type: ignore[attr-defined]
-        if type(value) is np.ndarray:
-            if type(value.base) is not np.ndarray and value.flags.carray:  # the common case, without a call of _held
-                value = value.view()
-                value.setflags(False)  # type: ignore[call-arg]  # three times as fast as by keyword
-            else:
-                value = _held(value)
-        object.__setattr__(made, name, value)
+        if type(value) is array and type(value.base) is not array and value.flags.carray:
+            value = value.view()  # the common case, without a call of _held
+            value.setflags(False)  # type: ignore[call-arg]  # three times as fast as by keyword
+        elif value is not None:
+            value = _held(value)
+        put(made, name, value)
     return made
 
 
@@ -116,14 +156,25 @@ def kernel_arrays(*fields: str) -> Callable[[Container], tuple[Any, ...]]:
     return attrgetter(*(f"{field}.base" for field in fields))
 
 
-def _held(array: NDArray[Any]) -> NDArray[Any]:
-    """Return an array as a read-only field, without a copy if possible."""
-    base, flags = array.base, array.flags
+_COMPONENTS = kernel_arrays("log_weights", "means", "covs", *(f"marks.{name}" for name in Marks._fields))
+
+
+def no_components(like: Any) -> Mixture:
+    """Return no components, with the states and marks of a container or a birth model, or of a state dimension."""
+    dim, marks = (like.state_dim, like.marks) if hasattr(like, "marks") else (like, unmarked())
+    return components_of(np.empty(0), *no_gaussians(dim), taken_marks(marks, slice(0)))
+
+
+def _held(value: Any) -> Any:
+    """Return an array as a read-only field, without a copy if possible, also in marks; anything else as it is."""
+    if type(value) is not np.ndarray:
+        return Marks(*map(_held, value)) if type(value) is Marks else value
+    base, flags = value.base, value.flags
     if type(base) is not np.ndarray:
-        view = array.view() if flags.carray else np.array(array, order="C").view()
-    elif not flags.writeable and array.size == base.size and array.strides == base.strides:
-        return array
+        view = value.view() if flags.carray else np.array(value, order="C").view()
+    elif not flags.writeable and value.size == base.size and value.strides == base.strides:
+        return value
     else:  # a part of another array, whose base has another shape
-        view = np.array(array, order="C").view()
+        view = np.array(value, order="C").view()
     view.setflags(False)  # type: ignore[call-arg]  # three times as fast as by keyword or attribute
     return view

@@ -59,7 +59,7 @@ def marginalise(
     `merge_distance` are merged, and the heaviest `max_components` are kept; a `merge_distance` of 0 merges nothing.
 
     Hypotheses are returned by descending weight, equal weights in the order of their first occurrence. A product of
-    GLMBs is marginalised factor by factor, in their order; factors of one label in the form of `FactoredGLMB.from_lmb`
+    GLMBs is marginalised factor by factor, in their order; factors of one label in the form of `FactoredGLMB.of`
     keep the order of their hypotheses. Raises `InputError` for a limit outside its range.
     """
     caps = _checked_caps(max_components, log_min_weight, merge_distance)
@@ -69,7 +69,7 @@ def marginalise(
 
 
 def marginalised_factors(density: FactoredGLMB, caps: MixtureCaps) -> FactoredGLMB:
-    """Return the density with every factor marginalised, in order; factors in the form of `from_lmb` keep that form."""
+    """Return the density with every factor marginalised, in order; those in the form of an LMB keep it."""
     bernoulli = density.is_bernoulli
     if bernoulli.all() and len(density.tracks.log_weights) == density.num_factors:
         return density

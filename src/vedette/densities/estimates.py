@@ -21,7 +21,7 @@ from vedette.densities.tracks import (
     TrackTable,
     gaussian_tracks,
     heaviest_components,
-    mean_class_probs,
+    mean_marks,
     take_tracks,
     track_moments,
 )
@@ -30,6 +30,7 @@ from vedette.errors import InputError, NumericalError, VedetteError
 from vedette.internal.representation import TabularRepr
 from vedette.internal.text import pluralise
 from vedette.kernels.base.types import Floats, Ints
+from vedette.kernels.gaussian.components import taken_components
 from vedette.kernels.gaussian.position_integrals import spread_nodes
 from vedette.kernels.labelled.heaviest import map_tracks
 from vedette.kernels.labelled.least_ospa import least_ospa_tracks
@@ -190,7 +191,7 @@ def least_gospa_estimate(density: LabelledDensity, cutoff: float = 100.0, order:
         best = int(np.argmin(of_points))
         means[i], covs[i], errors[i] = points[best], spreads[best], of_points[best]
     chosen = np.flatnonzero(2.0 * existence * (1.0 - errors) > 1.0)
-    return _peaks(gaussian_tracks(tracks.labels, means, covs, mean_class_probs(tracks)), chosen, existence[chosen])
+    return _peaks(gaussian_tracks(tracks.labels, means, covs, mean_marks(tracks)), chosen, existence[chosen])
 
 
 def best_estimate(density: Any, step: int) -> Estimate:
@@ -223,7 +224,9 @@ def marginal_estimate(density: LabelledDensity, threshold: float = 0.5) -> Estim
 def _peaks(tracks: TrackTable, chosen: Ints, existence: Floats) -> Estimate:
     """Return the estimate at the heaviest component of each chosen track."""
     heaviest = heaviest_components(tracks.log_weights, tracks.offsets, chosen)
-    classes = np.exp(mean_class_probs(take_tracks(tracks, chosen))) if tracks.num_classes else checks.no_classes()
+    classes = checks.no_classes()
+    if tracks.num_classes:
+        classes = np.exp(mean_marks(take_tracks(tracks, chosen)).log_class_probs)
     return Estimate(tracks.labels[chosen], tracks.means[heaviest], tracks.covs[heaviest], existence, classes)
 
 
@@ -237,8 +240,8 @@ def at_dominant_components(density: LMB) -> LMB:
     if len(tracks.log_weights) == num:
         return density
     peaks = heaviest_components(tracks.log_weights, tracks.offsets, np.arange(num))
-    columns = tracks.means, tracks.covs, tracks.log_class_probs
-    return density.with_fields(tracks=gaussian_tracks(tracks.labels, *(column[peaks] for column in columns)))
+    taken = taken_components(tracks.to_kernel().components, peaks)
+    return density.with_fields(tracks=gaussian_tracks(tracks.labels, *taken[1:]))
 
 
 def unlabelled_estimate(density: Poisson | IidCluster | MultiBernoulli, step: int) -> Estimate:
@@ -264,7 +267,7 @@ def unlabelled_estimate(density: Poisson | IidCluster | MultiBernoulli, step: in
     else:
         raise InputError(f"density: expected one without labels; got {type(density).__name__}")
     labels = np.column_stack([np.full(len(components), step), np.arange(len(components))]).astype(np.int64)
-    classes = np.exp(density.log_class_probs[components])
+    classes = np.exp(density.marks.log_class_probs[components])
     return Estimate(labels, density.means[components], density.covs[components], existence, classes)
 
 

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import ClassVar, Literal
+from typing import Any, ClassVar, Literal
 
 import numpy as np
 
 from vedette.densities import checks
 from vedette.densities.containers import kernel_arrays, unchecked
 from vedette.densities.glmb import GLMB, Hypotheses
-from vedette.densities.labelled import LMB, LabelledDensity
+from vedette.densities.labelled import LabelledDensity
 from vedette.densities.tracks import TrackTable, tracks_between
 from vedette.densities.undetected import UndetectedTargets
 from vedette.errors import InputError, VedetteError
@@ -129,11 +129,10 @@ class FactoredGLMB(Hypotheses):
         return unchecked(cls, TrackTable.from_kernel(density.tracks), *density[1:], undetected)
 
     @classmethod
-    def empty(cls, state_dim: int, num_classes: int = 0) -> FactoredGLMB:
-        """Return the density that is certain of no target, without factors."""
+    def empty(cls, like: Any) -> FactoredGLMB:
+        """Return the density that is certain of no target, without factors. like: as in `TrackTable.empty`."""
         zero, none = np.zeros(1, np.int64), np.empty(0, np.int64)
-        tracks = TrackTable.empty(state_dim, num_classes)
-        return unchecked(cls, tracks, zero, zero.copy(), none, np.empty(0), np.zeros(1, np.int64), None)
+        return unchecked(cls, TrackTable.empty(like), zero, zero.copy(), none, np.empty(0), np.zeros(1, np.int64), None)
 
     @classmethod
     def from_factors(cls, factors: Sequence[GLMB], state_dim: int) -> FactoredGLMB:
@@ -153,25 +152,15 @@ class FactoredGLMB(Hypotheses):
         return density if isinstance(density, cls) else unchecked(cls, density.tracks, *density.to_factors()[1:], None)
 
     @classmethod
-    def from_glmb(cls, glmb: GLMB) -> FactoredGLMB:
-        """Return the same density as one factor."""
-        return cls.of(glmb)
-
-    @classmethod
-    def from_lmb(cls, lmb: LMB) -> FactoredGLMB:
-        """Return the same density with one factor per label, whose hypotheses are absence and presence."""
-        return cls.of(lmb)
-
-    @classmethod
     def product(cls, parts: Sequence[FactoredGLMB], state_dim: int) -> FactoredGLMB:
         """Return the product of densities, no two of which may share a label: their factors, concatenated.
 
         state_dim: of all densities. Raises `InputError` for a label in two of them.
         """
-        num_classes = max((part.num_classes for part in parts), default=0)
+        empty = cls.empty(parts[0].tracks if parts else state_dim)
         parts = [part for part in parts if part.num_factors > 0]
         if len(parts) < 2:
-            return parts[0] if parts else cls.empty(state_dim, num_classes)
+            return parts[0] if parts else empty
         stack = stack_glmbs([part.as_hypotheses() for part in parts])
         made: FactoredGLMB = unchecked(
             cls,
@@ -243,7 +232,7 @@ def sets_of_factors(hypotheses: kt.Glmb, factor_of: Ints) -> tuple[Ints, Ints]:
 
 
 def bernoulli_factors(density: kt.FactoredGlmb) -> Bools:
-    """Mask (num_factors,) of the factors of one label in the form of `from_lmb`: absent, then present."""
+    """Mask (num_factors,) of the factors of one label in the form of an LMB: absent, then present."""
     tracks, factors, hyps = density.track_offsets, density.factor_offsets, density.hyp_offsets
     alone = np.flatnonzero((tracks[1:] - tracks[:-1] == 1) & (factors[1:] - factors[:-1] == 2))
     first, found = factors[alone], np.zeros(len(factors) - 1, np.bool_)

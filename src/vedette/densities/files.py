@@ -5,13 +5,11 @@ from __future__ import annotations
 import os
 from collections.abc import Mapping
 from dataclasses import fields
-from operator import attrgetter
 from pathlib import Path
-from typing import Any, TypeAlias, cast
+from typing import Any, TypeAlias
 
 import numpy as np
 
-from vedette.densities.checks import no_classes
 from vedette.densities.factored import FactoredGLMB
 from vedette.densities.glmb import GLMB
 from vedette.densities.labelled import LMB, LabelledDensity
@@ -23,6 +21,8 @@ from vedette.errors import InputError, VedetteError
 from vedette.internal.files import write_file
 from vedette.internal.reading import error_summary, read_arrays, read_file, unreadable
 from vedette.internal.text import shown
+from vedette.kernels.base.types import Marks
+from vedette.kernels.gaussian.marks import unmarked
 from vedette.models import CellGrid, Region
 
 FORMAT_NAME = "vedette-density"
@@ -38,7 +38,6 @@ _KINDS: dict[str, type[Density]] = {
     "multi_bernoulli": MultiBernoulli,
 }
 _UNDETECTED = "undetected"
-_SOURCES, _CLASSES = "tracks.sources", "log_class_probs"  # are left out if there are none
 
 
 def save_density(path: str | os.PathLike[str], density: Density) -> None:
@@ -50,12 +49,8 @@ def save_density(path: str | os.PathLike[str], density: Density) -> None:
     if kind is None:
         raise InputError(f"density: expected a multi-target density; got {type(density).__name__}")
     arrays: dict[str, Any] = {"format": FORMAT_NAME, "version": FORMAT_VERSION, "kind": kind}
-    arrays |= {name: array for name in _names(type(density)) if (array := attrgetter(name)(density)) is not None}
-    if isinstance(density, FactoredGLMB) and density.undetected is not None:
-        arrays |= _arrays_of_undetected(density.undetected)
-    none = [name for name in arrays if name.endswith(_CLASSES) and arrays[name].shape[1] == 0]
-    given = {name: array for name, array in arrays.items() if name not in none}
-    write_file(Path(path), lambda file: np.savez(file, **given))
+    arrays |= _arrays(density)
+    write_file(Path(path), lambda file: np.savez(file, **arrays))
 
 
 def load_density(path: str | os.PathLike[str]) -> Density:
@@ -73,7 +68,7 @@ def load_density(path: str | os.PathLike[str]) -> Density:
         raise InputError(f"{source}: expected a density file; it is damaged or another: {fault}") from fault
     kind = _kind_of(source, arrays)
     try:
-        return _build(kind, arrays)  # which validates
+        return _KINDS[kind](**_fields(_KINDS[kind], arrays))  # which validates
     except KeyError as fault:
         raise InputError(f"{source}: expected an array {fault.args[0]!r}; got none") from fault
     except VedetteError as fault:
@@ -93,27 +88,40 @@ def _kind_of(source: Path, arrays: Mapping[str, Any]) -> str:
     return kind
 
 
-def _names(container: type[Any]) -> list[str]:
-    """Return the names of a container's arrays in a file, in the order of its fields, the track table first."""
-    of_tracks = (
-        [f"tracks.{field.name}" for field in fields(TrackTable)] if issubclass(container, LabelledDensity) else []
-    )
-    return of_tracks + [field.name for field in fields(container) if field.name not in ("tracks", "undetected")]
+def _arrays(container: Any, prefix: str = "") -> dict[str, Any]:
+    """Return the arrays of a container by their names in a file; without sources and marks that there are not."""
+    arrays: dict[str, Any] = {}
+    for field in fields(container):
+        name, value = f"{prefix}{field.name}", getattr(container, field.name)
+        if field.name == "tracks":
+            arrays |= _arrays(value, "tracks.")
+        elif field.name == "marks":
+            arrays |= {f"{name}.{own}": array for own, array in value._asdict().items() if array.shape[1] > 0}
+        elif isinstance(value, UndetectedTargets):
+            arrays |= _arrays_of_undetected(value)
+        elif value is not None:
+            arrays[name] = value
+    return arrays
 
 
-def _build(kind: str, arrays: Mapping[str, Any]) -> Density:
-    container: Any = _KINDS[kind]
-    arrays = {f"{part}{_CLASSES}": no_classes() for part in ("", "tracks.", f"{_UNDETECTED}.")} | dict(arrays)
-    own: list[Any] = [arrays.get(name) if name == _SOURCES else arrays[name] for name in _names(container)]
-    if not issubclass(container, LabelledDensity):
-        return cast(Density, container(*own))
-    num = len(fields(TrackTable))
-    undetected = {} if f"{_UNDETECTED}.next_label" not in arrays else {"undetected": _undetected_of(arrays)}
-    return cast(Density, container(TrackTable(*own[:num]), *own[num:], **undetected))
+def _fields(container: type[Any], arrays: Mapping[str, Any], prefix: str = "") -> dict[str, Any]:
+    """Return the fields of a container by name, from the arrays of a file."""
+    own: dict[str, Any] = {}
+    for name in (field.name for field in fields(container)):
+        if name == "tracks":
+            own[name] = TrackTable(**_fields(TrackTable, arrays, "tracks."))
+        elif name == "marks":
+            marks = unmarked()._asdict().items()
+            own[name] = Marks(*(arrays.get(f"{prefix}marks.{column}", none) for column, none in marks))
+        elif name == "undetected":
+            own[name] = _undetected_of(arrays) if f"{_UNDETECTED}.next_label" in arrays else None
+        else:
+            own[name] = arrays.get(f"{prefix}{name}") if name == "sources" else arrays[f"{prefix}{name}"]
+    return own
 
 
 def _arrays_of_undetected(undetected: UndetectedTargets) -> dict[str, Any]:
-    parts = {name: getattr(undetected.intensity, name) for name in _names(Poisson)}
+    parts = _arrays(undetected.intensity)
     parts["next_label"] = np.array(undetected.next_label)
     if undetected.cells is not None:
         grid = undetected.cells.grid
@@ -135,4 +143,4 @@ def _undetected_of(arrays: Mapping[str, Any]) -> UndetectedTargets:
         grid = CellGrid(Region(x_min, x_max, y_min, y_max), *own["cells"].tolist())
         cells = UndetectedIntensity(grid, own["expected"])
     step, index = own["next_label"].tolist()
-    return UndetectedTargets(Poisson(*(own[name] for name in _names(Poisson))), (step, index), cells, learnt)
+    return UndetectedTargets(Poisson(**_fields(Poisson, own)), (step, index), cells, learnt)

@@ -119,10 +119,9 @@ class GLMB(Hypotheses):
         return unchecked(cls, TrackTable.from_kernel(glmb.tracks, sources), *glmb[1:])
 
     @classmethod
-    def empty(cls, state_dim: int, num_classes: int = 0) -> GLMB:
-        """Return the density that is certain of no target."""
-        none = TrackTable.empty(state_dim, num_classes)
-        return unchecked(cls, none, np.zeros(2, np.int64), np.empty(0, np.int64), np.zeros(1))
+    def empty(cls, like: Any) -> GLMB:
+        """Return the density that is certain of no target. like: as in `TrackTable.empty`."""
+        return unchecked(cls, TrackTable.empty(like), np.zeros(2, np.int64), np.empty(0, np.int64), np.zeros(1))
 
     @classmethod
     def from_hypotheses(cls, tracks: TrackTable, hypotheses: Sequence[Sequence[int]], weights: Any) -> GLMB:

@@ -83,7 +83,7 @@ def in_label_order(density: FactoredGLMB) -> FactoredGLMB:
 
 
 def lmb_of_factors(density: FactoredGLMB, factors: Ints) -> LMB:
-    """Return factors of one label each, in the form of `FactoredGLMB.from_lmb` and in label order, as an LMB."""
+    """Return factors of one label each, in the form of `FactoredGLMB.of` and in label order, as an LMB."""
     first = density.factor_offsets[factors]
     logits = density.hyp_log_weights[first + 1] - density.hyp_log_weights[first]
     return unchecked(LMB, take_tracks(density.tracks, density.track_offsets[factors]), logits)
@@ -92,7 +92,7 @@ def lmb_of_factors(density: FactoredGLMB, factors: Ints) -> LMB:
 def as_single_factor(glmb: GLMB) -> FactoredGLMB:
     """Return a GLMB as one factor.
 
-    With one label it has the form of `FactoredGLMB.from_lmb`; with no label there is no factor. Nothing is lost: the
+    With one label it has the form of `FactoredGLMB.of`; with no label there is no factor. Nothing is lost: the
     tracks of one label become one mixture of all their components.
     """
     labels, _ = distinct_labels(glmb.tracks.labels[glmb.hyp_tracks])
@@ -179,7 +179,7 @@ class JoinedFactors(NamedTuple):
     factors without labels are in none.
 
     densities: the densities of the factors. groups: for each density, (num_factors,) the group of each factor, or -1.
-    alone: (num_groups,) True if all factors in the group are of its only label, in the form of `FactoredGLMB.from_lmb`.
+    alone: (num_groups,) True if all factors in the group are of its only label, in the form of `FactoredGLMB.of`.
     """
 
     densities: tuple[FactoredGLMB, ...]

@@ -50,12 +50,12 @@ class LabelledDensity(MultiTarget):
     @property
     def state_dim(self) -> int:
         """Length of a target's state."""
-        return int(self.tracks.means.shape[1])
+        return self.tracks.state_dim
 
     @property
     def num_classes(self) -> int:
         """Number of classes of targets; 0 if they have none."""
-        return int(self.tracks.log_class_probs.shape[1])
+        return self.tracks.num_classes
 
     @property
     @abstractmethod
@@ -248,9 +248,9 @@ class LMB(LabelledDensity):
         return unchecked(cls, TrackTable.from_kernel(lmb.tracks), lmb.existence_logit)
 
     @classmethod
-    def empty(cls, state_dim: int, num_classes: int = 0) -> LMB:
-        """Return the density that is certain of no target."""
-        return unchecked(cls, TrackTable.empty(state_dim, num_classes), np.empty(0))
+    def empty(cls, like: Any) -> LMB:
+        """Return the density that is certain of no target. like: as in `TrackTable.empty`."""
+        return unchecked(cls, TrackTable.empty(like), np.empty(0))
 
     @classmethod
     def from_bernoullis(cls, labels: Any, existence: Any, means: Any, covs: Any) -> LMB:

@@ -9,7 +9,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from vedette.densities import checks
-from vedette.densities.containers import kernel_arrays, unchecked
+from vedette.densities.containers import for_kernel, no_components, unchecked
 from vedette.densities.inspection import Target, Targets
 from vedette.densities.labelled import poisson_binomial
 from vedette.densities.tracks import run_moments
@@ -18,9 +18,7 @@ from vedette.errors import NumericalError, VedetteError
 from vedette.internal.probabilities import expit
 from vedette.kernels.base import types as kt
 from vedette.kernels.base.types import Floats, Ints
-from vedette.models.arguments import no_gaussians
-
-_ARRAYS = kernel_arrays("existence_logit", "offsets", *kt.Mixture._fields)
+from vedette.kernels.gaussian.marks import unmarked
 
 
 @dataclass(frozen=True, slots=True, repr=False)
@@ -33,7 +31,7 @@ class MultiBernoulli(Unlabelled):
         log_weights: (num_components,) log mixture weights, normalised within each Bernoulli.
         means: (num_components, state_dim).
         covs: (num_components, state_dim, state_dim), symmetric positive definite.
-        log_class_probs: (num_components, num_classes) log probability of each class; 0 classes if targets have none.
+        marks: optional columns of the components, such as log probabilities of classes.
 
     The arrays are copied, checked once at creation, and read-only afterwards.
 
@@ -46,7 +44,7 @@ class MultiBernoulli(Unlabelled):
     log_weights: Floats
     means: Floats
     covs: Floats
-    log_class_probs: Floats = field(default_factory=checks.no_classes)
+    marks: kt.Marks = field(default_factory=unmarked)
     _weight: ClassVar[str] = "existence"
 
     def targets(self) -> Iterator[Target]:
@@ -81,8 +79,8 @@ class MultiBernoulli(Unlabelled):
     def to_kernel(self) -> kt.Lmb:
         """Return the arrays as a kernel bundle, with label (-1, -1) for all."""
         labels = np.full((self.num_bernoullis, 2), -1, np.int64)
-        existence_logit, offsets, *columns = _ARRAYS(self)
-        return kt.Lmb(kt.Tracks(labels, offsets, kt.Mixture(*columns)), existence_logit)
+        tracks = kt.Tracks(labels, for_kernel(self.offsets), self._components())
+        return kt.Lmb(tracks, for_kernel(self.existence_logit))
 
     @classmethod
     def from_kernel(cls, lmb: kt.Lmb) -> MultiBernoulli:
@@ -90,10 +88,9 @@ class MultiBernoulli(Unlabelled):
         return unchecked(cls, lmb.existence_logit, lmb.tracks.offsets, *lmb.tracks.components)
 
     @classmethod
-    def empty(cls, state_dim: int, num_classes: int = 0) -> MultiBernoulli:
-        """Return the density that is certain of no target."""
-        none, classes = no_gaussians(state_dim), np.empty((0, num_classes))
-        return cls(np.empty(0), np.zeros(1, np.int64), np.empty(0), *none, classes)
+    def empty(cls, like: Any) -> MultiBernoulli:
+        """Return the density that is certain of no target. like: as in `TrackTable.empty`."""
+        return cls(np.empty(0), np.zeros(1, np.int64), *no_components(like))
 
     @classmethod
     def from_gaussians(cls, existence: Any, means: Any, covs: Any) -> MultiBernoulli:

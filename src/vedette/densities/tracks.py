@@ -6,28 +6,26 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from itertools import pairwise
-from operator import attrgetter
 from typing import Any
 
 import numpy as np
 
 from vedette.densities import checks
-from vedette.densities.containers import Container, for_kernel, kernel_arrays, unchecked
+from vedette.densities.containers import Components, for_kernel, kernel_arrays, no_components, unchecked
 from vedette.errors import InputError, NumericalError, VedetteError
 from vedette.internal.text import pluralise
 from vedette.kernels.base import types as kt
 from vedette.kernels.base.types import Floats, Ints
 from vedette.kernels.gaussian.components import components_of, taken_components
+from vedette.kernels.gaussian.marks import merged_runs, unmarked
 from vedette.kernels.gaussian.mixtures import heaviest_of_runs
-from vedette.models.arguments import no_gaussians
 
 UNSCANNED = -2  # replaces a measurement index
-_ARRAYS = kernel_arrays("labels", "offsets", *kt.Mixture._fields)
-_MIXTURES = attrgetter("offsets", *kt.Mixture._fields)
+_ARRAYS = kernel_arrays("labels", "offsets")
 
 
 @dataclass(frozen=True, slots=True, repr=False)
-class TrackTable(Container):
+class TrackTable(Components):
     """Gaussian-mixture densities of labelled tracks.
 
     Attributes:
@@ -36,7 +34,7 @@ class TrackTable(Container):
         log_weights: (num_components,) log mixture weights, normalised within each track.
         means: (num_components, state_dim).
         covs: (num_components, state_dim, state_dim), symmetric positive definite.
-        log_class_probs: (num_components, num_classes) log probability of each class; 0 classes if targets have none.
+        marks: optional columns of the components, such as log probabilities of classes.
         sources: (num_tracks, 2) origin of each track in a `DeltaGlmbFilter`: its track in the previous belief, -1 if it
             was born; and the row of its measurement in the scan, -1 if it was missed, -2 if there was no scan (a
             prediction). None for tracks made of several, or by another filter, and if the origin is unknown.
@@ -52,12 +50,8 @@ class TrackTable(Container):
     log_weights: Floats
     means: Floats
     covs: Floats
-    log_class_probs: Floats = field(default_factory=checks.no_classes)
+    marks: kt.Marks = field(default_factory=unmarked)
     sources: Ints | None = None
-
-    def __post_init__(self) -> None:
-        self._own_arrays()
-        self.validate(error=InputError)
 
     @property
     def num_tracks(self) -> int:
@@ -69,24 +63,14 @@ class TrackTable(Container):
         return f"of {pluralise(self.num_tracks, 'track')} in {components}, of {self.state_dim} state components"
 
     @property
-    def state_dim(self) -> int:
-        """Length of a target's state."""
-        return int(self.means.shape[1])
-
-    @property
-    def num_classes(self) -> int:
-        """Number of classes of targets; 0 if they have none."""
-        return int(self.log_class_probs.shape[1])
-
-    @property
     def measurements(self) -> Ints | None:
         """Measurements in `sources`, shape (num_tracks,); None if they are unknown or there was no scan."""
         return None if self.sources is None or (self.sources[:, 1] == UNSCANNED).any() else self.sources[:, 1]
 
     def to_kernel(self) -> kt.Tracks:
         """Return the arrays as a kernel bundle."""
-        labels, offsets, *columns = _ARRAYS(self)
-        return kt.Tracks(labels, offsets, kt.Mixture(*columns))
+        labels, offsets = _ARRAYS(self)
+        return kt.Tracks(labels, offsets, self._components())
 
     @classmethod
     def from_kernel(cls, tracks: kt.Tracks, sources: Ints | None = None) -> TrackTable:
@@ -94,11 +78,12 @@ class TrackTable(Container):
         return unchecked(cls, tracks.labels, tracks.offsets, *tracks.components, sources)
 
     @classmethod
-    def empty(cls, state_dim: int, num_classes: int = 0) -> TrackTable:
-        """Return a table without tracks. Raises `InputError` for an invalid state dimension."""
-        labels, offsets = np.empty((0, 2), np.int64), np.zeros(1, np.int64)
-        none = components_of(np.empty(0), *no_gaussians(state_dim), np.empty((0, num_classes)))
-        return cls.from_kernel(kt.Tracks(labels, offsets, none))
+    def empty(cls, like: Any) -> TrackTable:
+        """Return a table without tracks. Raises `InputError` for an invalid state dimension.
+
+        like: a state dimension, or a track table, density without labels or birth model of the same states and marks.
+        """
+        return cls.from_kernel(kt.Tracks(np.empty((0, 2), np.int64), np.zeros(1, np.int64), no_components(like)))
 
     @classmethod
     def from_gaussians(cls, labels: Any, means: Any, covs: Any) -> TrackTable:
@@ -163,14 +148,15 @@ def take_tracks(tracks: TrackTable, places: Ints) -> TrackTable:
 def tracks_between(tracks: TrackTable, first: int, last: int) -> TrackTable:
     """Return the tracks `first:last`."""
     start, stop = tracks.offsets[first], tracks.offsets[last]
-    columns = (column[start:stop] for column in tracks.to_kernel().components)
+    components = taken_components(tracks.to_kernel().components, slice(start, stop))
     sources = None if tracks.sources is None else tracks.sources[first:last]
-    return unchecked(TrackTable, tracks.labels[first:last], tracks.offsets[first : last + 1] - start, *columns, sources)
+    offsets = tracks.offsets[first : last + 1] - start
+    return TrackTable.from_kernel(kt.Tracks(tracks.labels[first:last], offsets, components), sources)
 
 
 def relabelled_tracks(tracks: TrackTable, labels: Ints) -> TrackTable:
     """Return the same mixtures with other labels."""
-    return unchecked(TrackTable, labels, *_MIXTURES(tracks), None)
+    return tracks.with_fields(labels=labels, sources=None)
 
 
 def places_of(labels: Ints, table: Ints) -> Ints:
@@ -179,10 +165,10 @@ def places_of(labels: Ints, table: Ints) -> Ints:
     return np.array([place.get(tuple(label), -1) for label in labels.tolist()], np.int64)
 
 
-def gaussian_tracks(labels: Ints, means: Floats, covs: Floats, log_class_probs: Floats | None = None) -> TrackTable:
+def gaussian_tracks(labels: Ints, means: Floats, covs: Floats, marks: kt.Marks | None = None) -> TrackTable:
     """Return `TrackTable.from_gaussians` of internal arrays, without copies and checks."""
     num = len(labels)
-    components = components_of(np.zeros(num), means, covs, log_class_probs)
+    components = components_of(np.zeros(num), means, covs, marks)
     return TrackTable.from_kernel(kt.Tracks(labels, np.arange(num + 1), components))
 
 
@@ -202,7 +188,7 @@ def single_gaussians(tracks: TrackTable) -> TrackTable:
     """Return the tracks with each mixture replaced by one Gaussian of its moments."""
     if len(tracks.log_weights) == tracks.num_tracks:
         return tracks
-    return gaussian_tracks(tracks.labels, *track_moments(tracks), mean_class_probs(tracks))
+    return gaussian_tracks(tracks.labels, *track_moments(tracks), mean_marks(tracks))
 
 
 def mixture_moments(log_weights: Floats, means: Floats, covs: Floats) -> tuple[Floats, Floats]:
@@ -218,13 +204,9 @@ def mixture_moments(log_weights: Floats, means: Floats, covs: Floats) -> tuple[F
     return mean[0], cov[0]
 
 
-def mean_class_probs(tracks: TrackTable) -> Floats:
-    """Return the log probability of each class of every track, shape (num_tracks, num_classes)."""
-    if len(tracks.log_weights) == tracks.num_tracks or tracks.num_classes == 0:
-        return tracks.log_class_probs[: tracks.num_tracks].copy()
-    probs = np.exp(tracks.log_weights)[:, np.newaxis] * np.exp(tracks.log_class_probs)
-    with np.errstate(divide="ignore"):
-        return np.asarray(np.log(np.add.reduceat(probs, tracks.offsets[:-1])))
+def mean_marks(tracks: TrackTable) -> kt.Marks:
+    """Return the marks of every track, those of its components merged."""
+    return merged_runs(tracks.log_weights, tracks.offsets, tracks.marks)
 
 
 def track_moments(tracks: TrackTable) -> tuple[Floats, Floats]:

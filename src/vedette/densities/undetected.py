@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -62,9 +63,9 @@ class UndetectedTargets(SummaryRepr):
         return poisson_numbers(self.expected_number)
 
     @classmethod
-    def none(cls, state_dim: int, num_classes: int = 0) -> UndetectedTargets:
-        """Return the density without targets, before the first scan."""
-        return cls(Poisson.empty(state_dim, num_classes), (0, 0))
+    def none(cls, like: Any) -> UndetectedTargets:
+        """Return the density without targets, before the first scan. like: as in `TrackTable.empty`."""
+        return cls(Poisson.empty(like), (0, 0))
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)

@@ -10,32 +10,21 @@ from typing import Any, ClassVar
 import numpy as np
 
 from vedette.densities import checks
-from vedette.densities.containers import MultiTarget, kernel_arrays, unchecked
+from vedette.densities.containers import Components, MultiTarget, for_kernel, no_components, unchecked
 from vedette.densities.inspection import Targets
 from vedette.densities.tracks import log_weights as logs_of
 from vedette.errors import InputError, NumericalError, VedetteError
 from vedette.internal.text import pluralise
 from vedette.kernels.base import types as kt
 from vedette.kernels.base.types import Floats
-from vedette.models.arguments import no_gaussians
-
-_POISSON = kernel_arrays(*kt.Mixture._fields)
-_CLUSTER = kernel_arrays("log_cardinality", *kt.Mixture._fields)
+from vedette.kernels.gaussian.marks import unmarked
 
 
-class Unlabelled(MultiTarget):
+class Unlabelled(Components, MultiTarget):
     """Base of the unlabelled densities of Gaussian components. The arrays are copied, checked once, and read-only."""
 
     __slots__ = ()
-    log_weights: Floats
-    means: Floats
-    covs: Floats
-    log_class_probs: Floats
     _weight: ClassVar[str] = "expected_number"
-
-    def __post_init__(self) -> None:
-        self._own_arrays()
-        self.validate(error=InputError)
 
     def __len__(self) -> int:
         """Number of components, or of Bernoullis of a multi-Bernoulli."""
@@ -46,23 +35,9 @@ class Unlabelled(MultiTarget):
         return f"of {pluralise(len(self), what)}, {self.expected_number:.4g} targets expected"
 
     @property
-    def state_dim(self) -> int:
-        """Length of a target's state."""
-        return int(self.means.shape[1])
-
-    @property
-    def num_classes(self) -> int:
-        """Number of classes of targets; 0 if they have none."""
-        return int(self.log_class_probs.shape[1])
-
-    @property
     @abstractmethod
     def expected_number(self) -> float:
         """Mean number of targets."""
-
-    @abstractmethod
-    def validate(self, *, error: type[VedetteError] = NumericalError) -> None:
-        """Raise unless the arrays are consistent and form a density."""
 
 
 @dataclass(frozen=True, slots=True, repr=False)
@@ -73,7 +48,7 @@ class Poisson(Unlabelled):
         log_weights: (num_components,) log of the expected number of targets of each component.
         means: (num_components, state_dim).
         covs: (num_components, state_dim, state_dim).
-        log_class_probs: (num_components, num_classes) log probability of each class; 0 classes if targets have none.
+        marks: optional columns of the components, such as log probabilities of classes.
 
     The arrays are copied, checked once at creation, and read-only afterwards.
 
@@ -84,7 +59,7 @@ class Poisson(Unlabelled):
     log_weights: Floats
     means: Floats
     covs: Floats
-    log_class_probs: Floats = field(default_factory=checks.no_classes)
+    marks: kt.Marks = field(default_factory=unmarked)
 
     @property
     def expected_number(self) -> float:
@@ -102,7 +77,7 @@ class Poisson(Unlabelled):
 
     def to_kernel(self) -> kt.Mixture:
         """Return the arrays as a kernel bundle."""
-        return kt.Mixture(*_POISSON(self))
+        return self._components()
 
     @classmethod
     def from_kernel(cls, mixture: kt.Mixture) -> Poisson:
@@ -110,9 +85,9 @@ class Poisson(Unlabelled):
         return unchecked(cls, *mixture)
 
     @classmethod
-    def empty(cls, state_dim: int, num_classes: int = 0) -> Poisson:
-        """Return the density that is certain of no target."""
-        return cls(np.empty(0), *no_gaussians(state_dim), np.empty((0, num_classes)))
+    def empty(cls, like: Any) -> Poisson:
+        """Return the density that is certain of no target. like: as in `TrackTable.empty`."""
+        return cls(*no_components(like))
 
     @classmethod
     def from_gaussians(cls, expected_numbers: Any, means: Any, covs: Any) -> Poisson:
@@ -156,7 +131,7 @@ class IidCluster(Unlabelled):
             if the density is certain of no target.
         means: (num_components, state_dim).
         covs: (num_components, state_dim, state_dim).
-        log_class_probs: (num_components, num_classes) log probability of each class; 0 classes if targets have none.
+        marks: optional columns of the components, such as log probabilities of classes.
 
     The arrays are copied, checked once at creation, and read-only afterwards.
 
@@ -168,7 +143,7 @@ class IidCluster(Unlabelled):
     log_weights: Floats
     means: Floats
     covs: Floats
-    log_class_probs: Floats = field(default_factory=checks.no_classes)
+    marks: kt.Marks = field(default_factory=unmarked)
 
     @property
     def expected_number(self) -> float:
@@ -184,8 +159,7 @@ class IidCluster(Unlabelled):
 
     def to_kernel(self) -> tuple[Floats, kt.Mixture]:
         """Return the log cardinality distribution and the density of one target in kernel form."""
-        log_cardinality, *mixture = _CLUSTER(self)
-        return log_cardinality, kt.Mixture(*mixture)
+        return for_kernel(self.log_cardinality), self._components()
 
     @classmethod
     def from_kernel(cls, log_cardinality: Floats, mixture: kt.Mixture) -> IidCluster:
@@ -193,9 +167,9 @@ class IidCluster(Unlabelled):
         return unchecked(cls, log_cardinality, *mixture)
 
     @classmethod
-    def empty(cls, state_dim: int, num_classes: int = 0) -> IidCluster:
-        """Return the density that is certain of no target."""
-        return cls(np.zeros(1), np.empty(0), *no_gaussians(state_dim), np.empty((0, num_classes)))
+    def empty(cls, like: Any) -> IidCluster:
+        """Return the density that is certain of no target. like: as in `TrackTable.empty`."""
+        return cls(np.zeros(1), *no_components(like))
 
     @classmethod
     def from_gaussians(cls, cardinality: Any, weights: Any, means: Any, covs: Any) -> IidCluster:

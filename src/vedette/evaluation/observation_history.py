@@ -12,7 +12,7 @@ from vedette.densities import FactoredGLMB, TrackHistory, UndetectedTargets, as_
 from vedette.errors import InputError
 from vedette.filters import FactoredGlmbFilter
 from vedette.kernels.base.types import Bools, Floats, Mixture
-from vedette.kernels.gaussian.components import components_of, joined_components, without_classes
+from vedette.kernels.gaussian.components import components_of, joined_components
 from vedette.kernels.gaussian.intensities import moved
 from vedette.kernels.steps.undetected import WIDE
 from vedette.models import SensorModel, TargetModel
@@ -117,7 +117,7 @@ def birth_intensity(belief: FactoredGLMB, history: TrackHistory, observations: O
     undetected, labels, birth = belief.undetected, as_lmb(belief), observations.targets.birth
     assert isinstance(undetected, UndetectedTargets)
     at_sites = labels.tracks.to_kernel().components._replace(log_weights=np.log(labels.existence))
-    parts = [without_classes(undetected.intensity.to_kernel()), without_classes(at_sites)]
+    parts = [components_of(*mixture[:3]) for mixture in (undetected.intensity.to_kernel(), at_sites)]
     if undetected.cells is not None and birth.from_measurements is not None:
         grid, in_plane = undetected.cells.grid, np.arange(birth.state_dim) < 2
         std = birth.from_measurements.std * np.where(in_plane, WIDE, 1.0)

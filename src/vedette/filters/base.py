@@ -163,7 +163,7 @@ class LabelledFilterBase(WithBirths, ABC, Generic[BeliefT]):
 
     def initial(self) -> BeliefT:
         """Return the belief before the first scan: no target."""
-        empty: BeliefT = self.kind.empty(self.targets.state_dim, self.targets.num_classes)
+        empty: BeliefT = self.kind.empty(self.targets.birth)
         return empty
 
     def _before_scan(self, prior: BeliefT, dt: float, step: Any, births: LMB | None) -> Any:
@@ -249,12 +249,7 @@ class LabelledFilter(SingleSensorFilter, LabelledFilterBase[BeliefT]):
         return self._taken(self._before_scan(prior, 0.0, None, None), inputs, rng, [repeats], "")
 
     def _taken(
-        self,
-        prior: Any,
-        inputs: StepInputs,
-        rng: np.random.Generator | None,
-        repeats: Sequence[Ints],
-        place: str,
+        self, prior: Any, inputs: StepInputs, rng: np.random.Generator | None, repeats: Sequence[Ints], place: str
     ) -> tuple[BeliefT, FilterInfo]:
         try:
             step = SensorStep(inputs, step_limits(self, self.sensor), self.sensor, rng=rng)

@@ -18,13 +18,7 @@ from vedette.filters.inputs import born_at, check_new, no_births_for_kernel
 from vedette.filters.limits import Limits
 from vedette.filters.multi_sensor import MultiSensorFilter, SequentialUpdate
 from vedette.filters.protocols import FilterInfo
-from vedette.filters.region_births import (
-    arrivals_of,
-    region_births,
-    with_cells,
-    with_deaths,
-    with_learnt_rate,
-)
+from vedette.filters.region_births import arrivals_of, region_births, with_cells, with_deaths, with_learnt_rate
 from vedette.filters.undetected import (
     SplitBirths,
     after_scan,
@@ -84,11 +78,11 @@ class _FactoredFilterBase(LabelledFilterBase[FactoredGLMB]):
 
     def initial(self) -> FactoredGLMB:
         """Return the belief before the first scan: no target."""
-        empty = FactoredGLMB.empty(self.targets.state_dim, self.targets.num_classes)
+        empty = FactoredGLMB.empty(self.targets.birth)
         return empty if self.births == "labelled" else empty.with_fields(undetected=self._none())
 
     def _none(self) -> UndetectedTargets:
-        return UndetectedTargets.none(self.targets.state_dim, self.targets.num_classes)
+        return UndetectedTargets.none(self.targets.birth)
 
     def limits_of(self, sensor: SensorModel) -> Limits:
         return self.limits if self.births == "poisson" else LabelledFilterBase.limits_of(self, sensor)
@@ -136,7 +130,7 @@ class _FactoredFilterBase(LabelledFilterBase[FactoredGLMB]):
         )
         if undetected is not None:
             undetected = after_scan(undetected, missed, left, len(scan.measurements))
-        return prior._replace(density=density, undetected=undetected), report
+        return _Before(density, undetected, prior.arrivals, prior.error), report
 
     def _check(self, posterior: Any, report: FactoredReport, place: str) -> float:
         if report.log_total > -math.inf:
@@ -225,7 +219,9 @@ class FactoredGlmbFilter(_FactoredFilterBase, LabelledFilter[FactoredGLMB]):
         return replace(self, sensor=blind_sensor(), limits=self.limits.keeping_labels())
 
     def _run_kernel(self, prior: _Before, step: SensorStep) -> tuple[_Before, FactoredReport]:
-        return _FactoredFilterBase._run_kernel(self, prior, step._replace(num_scans=self.scans_together))
+        if step.num_scans != self.scans_together:
+            step = step._replace(num_scans=self.scans_together)
+        return _FactoredFilterBase._run_kernel(self, prior, step)
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)

@@ -19,6 +19,7 @@ from vedette.densities.tracks import gaussian_tracks, relabelled_tracks
 from vedette.errors import InputError, ModelError, VedetteError
 from vedette.internal.unit_warnings import warn_implausible
 from vedette.kernels.base.types import Floats, Ints, Lmb
+from vedette.kernels.gaussian.marks import taken_marks
 from vedette.kernels.gaussian.row_noise import row_length
 from vedette.kernels.gaussian.scans import examined_scan
 from vedette.kernels.labelled import births as kernels
@@ -147,23 +148,21 @@ def is_zero_duration(dt: Any) -> bool:
     return not isinstance(dt, bool) and isinstance(dt, Real) and dt == 0.0
 
 
-@cache
-def no_births(state_dim: int, num_classes: int) -> LMB:
-    """Return an LMB without targets, cached for each dimension and number of classes."""
-    return LMB.empty(state_dim, num_classes)
+@lru_cache(maxsize=100)
+def no_births(like: int | BirthModel) -> LMB:
+    """Return an LMB without targets, cached for each state dimension or birth model."""
+    return LMB.empty(like)
 
 
 @cache
 def no_births_for_kernel(state_dim: int) -> Lmb:
     """Return an empty birth density in kernel form, cached for each dimension."""
-    return no_births(state_dim, 0).to_kernel()
+    return no_births(state_dim).to_kernel()
 
 
 def births_at(birth: BirthModel, step: int) -> LMB:
     """Return the LMB of the births at `step`, or within the model's period, labelled (step, site)."""
-    if not birth.is_active(step):
-        return no_births(birth.state_dim, birth.num_classes)
-    return born_at(births_of(birth), step)
+    return born_at(births_of(birth), step) if birth.is_active(step) else no_births(birth)
 
 
 def born_at(born: LMB, step: int) -> LMB:
@@ -189,7 +188,8 @@ def births_within(born: LMB, period: float | None, dt: float, others: LMB | None
 def births_of(birth: BirthModel) -> LMB:
     """Return the births at the sites, labelled with step 0, cached for each model."""
     labels = np.column_stack([np.zeros(birth.num_sites, np.int64), np.arange(birth.num_sites)])
-    tracks = gaussian_tracks(labels, birth.means, birth.covs, np.tile(birth.log_class_probs, (birth.num_sites, 1)))
+    marks = taken_marks(birth.marks, np.zeros(birth.num_sites, np.int64))
+    tracks = gaussian_tracks(labels, birth.means, birth.covs, marks)
     return unchecked(LMB, tracks, np.log(birth.existence) - np.log1p(-birth.existence))
 
 

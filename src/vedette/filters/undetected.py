@@ -32,8 +32,8 @@ _COMPONENTS_A_SITE = 3
 def no_undetected(birth: BirthModel) -> Undetected:
     """Return the kernel input for an empty intensity of undetected targets."""
     dim, none = birth.state_dim, no_births(birth).undetected
-    places, std, classes = np.empty((0, dim)), np.zeros(dim), birth.log_class_probs
-    return Undetected(none, np.empty((0, 0)), no_cells(dim), places, std, classes, 0, 0, 0.0, True)
+    places, std, marks = np.empty((0, dim)), np.zeros(dim), birth.marks
+    return Undetected(none, np.empty((0, 0)), no_cells(dim), places, std, marks, 0, 0, 0.0, True)
 
 
 @lru_cache(maxsize=100)
@@ -68,8 +68,7 @@ def split_births(birth: BirthModel, dt: float) -> SplitBirths:
 @lru_cache(maxsize=100)
 def no_births(birth: BirthModel) -> SplitBirths:
     """Return empty births of both kinds."""
-    sizes = birth.state_dim, birth.num_classes
-    return SplitBirths(LMB.empty(*sizes), Poisson.empty(*sizes).to_kernel(), 0.0)
+    return SplitBirths(LMB.empty(birth), Poisson.empty(birth).to_kernel(), 0.0)
 
 
 def with_dropped(undetected: UndetectedTargets, before: FactoredGLMB, kept: FactoredGLMB) -> UndetectedTargets:
@@ -118,8 +117,8 @@ def before_scan(
             std = np.concatenate([np.hypot(std[:2], longest_lag(pose) * std[2:4]), std[2:]])
         places = sensor.measurement.states_at(scan, pose, len(std))
     rate = 0.0 if learnt is None else learnt.rate
-    classes = none.log_class_probs
-    return Undetected(intensity, tables_of(undetected), found.cells, places, std, classes, step, index, rate, is_placed)
+    tables, marks = tables_of(undetected), none.marks
+    return Undetected(intensity, tables, found.cells, places, std, marks, step, index, rate, is_placed)
 
 
 def after_scan(before: UndetectedTargets, missed: Mixture, left: Left, num_measurements: int) -> UndetectedTargets:

@@ -33,7 +33,7 @@ class UnlabelledFilter(SingleSensorFilter, ABC, Generic[_Density]):
 
     def initial(self) -> _Density:
         """Return the belief before the first scan: no target."""
-        empty: _Density = self.kind.empty(self.targets.state_dim, self.targets.num_classes)
+        empty: _Density = self.kind.empty(self.targets.birth)
         return empty
 
     def step(

@@ -36,7 +36,7 @@ def _one_a_group(belief: FactoredGLMB, groups: Ints, num_groups: int, max_produc
     ends = np.searchsorted(groups[order], np.arange(num_groups + 1))
     counts = np.diff(ends)
     single, none = np.flatnonzero(counts == 1), np.flatnonzero(counts == 0)
-    empty = FactoredGLMB.of(GLMB.empty(belief.state_dim, belief.num_classes))
+    empty = FactoredGLMB.of(GLMB.empty(belief.tracks))
     parts = [take_factors(belief, order[ends[single]]), take_factors(empty, np.zeros(len(none), np.int64))]
     several = np.flatnonzero(counts > 1)
     for group in several.tolist():
@@ -50,7 +50,7 @@ def _one_a_group(belief: FactoredGLMB, groups: Ints, num_groups: int, max_produc
 
 
 def sort_factors(marginalised: FactoredGLMB) -> FactoredGLMB:
-    """Return the factors in the order of their first labels; those of one label in the form of `FactoredGLMB.from_lmb`.
+    """Return the factors in the order of their first labels; those of one label in the form of `FactoredGLMB.of`.
 
     marginalised: each hypothesis must have its own tracks. Factors without tracks are dropped.
     """

@@ -13,14 +13,15 @@ from vedette.densities import LabelledDensity
 from vedette.errors import InputError
 from vedette.fusion.views import FieldsOfView
 from vedette.internal.text import join_alternatives
-from vedette.kernels.base.types import Bools, Floats, Ints
+from vedette.kernels.base.types import Bools, Floats, Ints, Marks
 from vedette.kernels.labelled.set_fusion import LOST, SURE
 from vedette.kernels.labelled.validity import is_valid_lmb
 from vedette.models.arguments import real, reject, sequence
 
 # Data type and number of dimensions of the arrays of an LMB: labels, offsets, columns of the components, logits.
 _INT, _FLOAT = np.dtype(np.int64), np.dtype(np.float64)
-_FORMS = ((_INT, 2), (_INT, 1), (_FLOAT, 1), (_FLOAT, 2), (_FLOAT, 3), (_FLOAT, 2), (_FLOAT, 1))
+_MIXTURE = (_FLOAT, 1), (_FLOAT, 2), (_FLOAT, 3), *((_FLOAT, 2) for _ in Marks._fields)
+_FORMS = (_INT, 2), (_INT, 1), (_FLOAT, 1), *_MIXTURE
 
 
 @dataclass(frozen=True, slots=True)
@@ -142,19 +143,19 @@ def all_valid(beliefs: Sequence[Any]) -> bool:
     return all(is_valid_lmb(belief.to_kernel()) for belief in beliefs)
 
 
-def _sizes(belief: LabelledDensity) -> tuple[int, int]:
-    return belief.state_dim, belief.num_classes
+def _sizes(belief: LabelledDensity) -> tuple[int, ...]:
+    return belief.state_dim, *(column.shape[1] for column in belief.tracks.marks)
 
 
 def _has_kernel_arrays(belief: Any) -> bool:
     """Return True if the arrays of an LMB have the types that kernels expect."""
     tracks, logits = belief.tracks, belief.existence_logit
-    columns = tracks.log_weights, tracks.means, tracks.covs, tracks.log_class_probs
-    arrays = tracks.labels, tracks.offsets, *columns, logits
+    columns = tracks.log_weights, tracks.means, tracks.covs, *tracks.marks
+    arrays = tracks.labels, tracks.offsets, logits, *columns
     for array, (dtype, ndim) in zip(arrays, _FORMS, strict=True):
         if type(array) is not np.ndarray or array.dtype != dtype or array.ndim != ndim:
             return False
-    return True
+    return all(len(column) == len(tracks.log_weights) for column in tracks.marks)
 
 
 def check_weights(weights: Sequence[float] | Floats) -> tuple[float, ...]:

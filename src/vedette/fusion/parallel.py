@@ -14,7 +14,7 @@ from vedette.densities.checks import offsets_of
 from vedette.densities.containers import unchecked
 from vedette.densities.conversions import marginalised_factors
 from vedette.densities.label_sets import WHOLE, in_label_order, join_factors
-from vedette.densities.tracks import mean_class_probs, places_of
+from vedette.densities.tracks import mean_marks, places_of
 from vedette.errors import InputError, NumericalError
 from vedette.fusion.base import FusionInfo, LogLinearPool, PrevalidatedBeliefs, check_beliefs, label_fusion_info
 from vedette.fusion.classes import class_gains, updated_classes
@@ -32,7 +32,7 @@ from vedette.fusion.powers import ONE, FusionLimits, check_limits
 from vedette.fusion.views import FieldsOfView
 from vedette.internal.probabilities import expit, log_expit
 from vedette.kernels.base.types import Floats, Ints, Mixture, Tracks
-from vedette.kernels.gaussian.components import components_of, taken_components
+from vedette.kernels.gaussian.components import taken_components
 from vedette.kernels.gaussian.pooling import reduced_tracks
 from vedette.kernels.labelled.parallel import update_in_parallel
 from vedette.kernels.labelled.stacking import stack_tracks
@@ -198,12 +198,13 @@ class ParallelUpdate:
             means, covs, log_overlaps = update_in_parallel(prior.means, prior.covs, chosen, weights, tracks, most)
         except FloatingPointError as fault:
             raise NumericalError(f"fusion of tracks: {fault}") from None
-        own, classes = mean_class_probs(TrackTable.from_kernel(tracks)), prior.log_class_probs
+        own, classes = mean_marks(TrackTable.from_kernel(tracks)).log_class_probs, prior.marks.log_class_probs
+        fused = prior._replace(log_weights=np.zeros(len(means)), means=means, covs=covs)
         if classes.shape[1] == 0:
-            return components_of(np.zeros(len(means)), means, covs), log_overlaps
+            return fused, log_overlaps
         gains = np.where((chosen >= 0)[..., np.newaxis], class_gains(own[chosen], classes[:, np.newaxis]), 0.0)
         classes, log_factors = updated_classes(classes, (weights[:, np.newaxis] * gains).sum(axis=1))
-        return components_of(np.zeros(len(means)), means, covs, classes), log_overlaps + log_factors
+        return fused._replace(marks=prior.marks._replace(log_class_probs=classes)), log_overlaps + log_factors
 
 
 def _moment_matched(belief: LMB) -> LMB:

@@ -6,7 +6,7 @@ import numpy as np
 
 from vedette.densities import LMB, TrackTable, track_moments
 from vedette.densities.containers import unchecked
-from vedette.densities.tracks import gaussian_tracks, mean_class_probs, place_labels, take_tracks
+from vedette.densities.tracks import gaussian_tracks, mean_marks, place_labels, take_tracks
 from vedette.fusion.classes import class_gains, updated_classes
 from vedette.kernels.base.types import Floats
 from vedette.kernels.labelled.stacking import stack_tracks
@@ -48,12 +48,12 @@ def rebase(posterior: LMB, own: LMB, prediction: LMB) -> LMB:
     new_means, new_covs = (moment[after] for moment in track_moments(posterior.tracks))
     means[at], covs[at], gained = _updated((means[at], covs[at]), (own_means, own_covs), (new_means, new_covs))
     said, known = posterior.existence_logit[after], own.existence_logit[before]
-    classes = mean_class_probs(prediction.tracks)
-    new_classes = mean_class_probs(posterior.tracks)[after], mean_class_probs(own.tracks)[before]
-    classes[at], log_factors = updated_classes(classes[at], class_gains(*new_classes))
+    marks, new, old = (mean_marks(belief.tracks) for belief in (prediction, posterior, own))
+    gains = class_gains(new.log_class_probs[after], old.log_class_probs[before])
+    marks.log_class_probs[at], log_factors = updated_classes(marks.log_class_probs[at], gains)
     with np.errstate(invalid="ignore"):  # an impossible or certain label that stays so carries no information
         logits[at] += np.where(said == known, 0.0, said - known) + gained + log_factors
-    return unchecked(LMB, gaussian_tracks(prediction.tracks.labels, means, covs, classes), logits)
+    return unchecked(LMB, gaussian_tracks(prediction.tracks.labels, means, covs, marks), logits)
 
 
 def _updated(

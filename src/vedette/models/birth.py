@@ -8,7 +8,8 @@ from typing import Literal
 
 import numpy as np
 
-from vedette.kernels.base.types import Floats
+from vedette.kernels.base.types import Floats, Marks
+from vedette.kernels.gaussian.marks import unmarked
 from vedette.models.arguments import float_array, instance, no_gaussians, positive, positive_definite, real, reject
 from vedette.models.grid import CellGrid
 from vedette.models.region import Region
@@ -157,9 +158,10 @@ class BirthModel:
         return 0 if self.class_probs is None else len(self.class_probs)
 
     @property
-    def log_class_probs(self) -> Floats:
-        """Log probability of each class of target, shape (num_classes,); empty if they have none."""
-        return np.empty(0) if self.class_probs is None else np.log(self.class_probs)
+    def marks(self) -> Marks:
+        """Marks of the component of a birth."""
+        none = unmarked(1)
+        return none if self.class_probs is None else none._replace(log_class_probs=np.log([self.class_probs]))
 
     def is_active(self, step: int) -> bool:
         """Return True if targets may be born at the sites at this filter step."""

@@ -35,7 +35,7 @@ class _Reference:
 
     def initial(self) -> LMB:
         """Return a density without targets."""
-        return LMB.empty(self.targets.state_dim, self.targets.num_classes)
+        return LMB.empty(self.targets.birth)
 
     def step(
         self,

@@ -123,12 +123,7 @@ class PlanningSensorManager(SensorManager):  # type: ignore[misc] # Stone Soup i
         self._rng = np.random.default_rng(self.seed)
 
     def choose_actions(
-        self,
-        tracks: Any,
-        timestamp: datetime.datetime,
-        nchoose: int = 1,
-        return_reward: bool = False,
-        **kwargs: Any,
+        self, tracks: Any, timestamp: datetime.datetime, nchoose: int = 1, return_reward: bool = False, **kwargs: Any
     ) -> Any:
         """Return the actions until `timestamp`, in the form of other sensor managers; `plan` has the plan behind them.
 
@@ -187,6 +182,6 @@ class PlanningSensorManager(SensorManager):  # type: ignore[misc] # Stone Soup i
             covs.append(moved[1])
             logits.append(logit(float(getattr(track, "metadata", {}).get("existence", self.existence))))
         if not means:
-            return LMB.empty(self.models.targets.state_dim, self.models.targets.num_classes)
+            return LMB.empty(self.models.targets.birth)
         labels = np.column_stack([np.ones(len(means), np.int64), np.arange(len(means))])
         return LMB(TrackTable.from_gaussians(labels, np.array(means), np.array(covs)), np.array(logits))

@@ -201,7 +201,7 @@ class BeliefNetwork(LocalFilters):
         """Return a sensor's belief, predicted without births to the time of the step `now`."""
         if sent is now:
             return sent.beliefs[sensor]
-        no_births = LMB.empty(self.targets.state_dim, self.targets.num_classes)
+        no_births = LMB.empty(self.targets.birth)
         elapsed = now.time - sent.time
         return self._predict(sensor, sent.beliefs[sensor], elapsed, now.step, no_births)[0]
 

@@ -115,7 +115,7 @@ def births_from_scans(
         return None
     first = birth.num_sites if owner is None else OWN_LABELS * (owner + 1)
     parameters = BirthsOfMeasurements(
-        model.std, birth.log_class_probs, float(model.expected), float(model.max_existence), step, first
+        model.std, birth.marks, float(model.expected), float(model.max_existence), step, first
     )
     scans = [scan if sensor.measurement.places else None for sensor, scan in zip(sensors, scans, strict=True)]
     scanned = [s for s, scan in enumerate(scans) if scan is not None]

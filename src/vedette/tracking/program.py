@@ -52,7 +52,7 @@ class ProgramFilter:
 
     def initial(self) -> LMB:
         """Return the belief without targets."""
-        return LMB.empty(self.targets.state_dim, self.targets.num_classes)
+        return LMB.empty(self.targets.birth)
 
     def step(
         self,

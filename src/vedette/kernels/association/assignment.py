@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from vedette.kernels.base.compile import borrowing, inlined, kernel
-from vedette.kernels.base.types import Floats, Ints
+from vedette.kernels.base.types import Floats, Ints, Marks
 
 ABSENT = -2
 MISSED = -1
@@ -29,8 +29,20 @@ class Options(NamedTuple):
     component_log_weights: Floats  # (num_entries,) of an option they sum to its weight; -inf outside the gate
     whitened: Floats  # (num_entries, meas_dim) whitened residuals of the components of a detection
     updated: Floats  # (num_entries, state_dim + 1, state_dim) mean, covariance of those that bend or are at an edge
-    log_class_probs: Floats  # (num_entries, num_classes) updated; 0 classes if the scan has no features of classes
+    marks: Marks  # (num_entries, ...) updated, in the columns that measurements of the scan change
     num_measurements: int  # of the scan
+
+
+def _with_options(
+    options: Options, offsets: Ints, columns: Ints, log_weights: Floats, entries: Ints, num_measurements: int
+) -> Options:
+    """Return other options of the same components."""
+    whitened, updated, marks, weights = options.whitened, options.updated, options.marks, options.component_log_weights
+    return Options(offsets, columns, log_weights, entries, weights, whitened, updated, marks, num_measurements)
+
+
+with_options = kernel(_with_options)
+borrowed_options = inlined(_with_options)  # for kernels that only borrow arrays
 
 
 class DualWork(NamedTuple):

@@ -13,15 +13,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from vedette.kernels.association.assignment import ABSENT, Options, make_dual_work, solve_assignment
-from vedette.kernels.association.children import (
-    Children,
-    Parents,
-    append_child,
-    grown_children,
-    is_full,
-    widest_parent,
-)
+from vedette.kernels.association.assignment import ABSENT, Options, make_dual_work, solve_assignment, with_options
+from vedette.kernels.association.children import Children, Parents, append_child, grown_children, is_full, widest_parent
 from vedette.kernels.base.arrays import filled_ints
 from vedette.kernels.base.compile import kernel
 from vedette.kernels.base.types import Floats, Ints
@@ -110,17 +103,7 @@ def _with_spare_row(options: Options) -> Options:
     for option in range(num):
         columns[option] = options.columns[option]
         log_weights[option] = options.log_weights[option]
-    return Options(
-        offsets,
-        columns,
-        log_weights,
-        options.entries,
-        options.component_log_weights,
-        options.whitened,
-        options.updated,
-        options.log_class_probs,
-        options.num_measurements,
-    )
+    return with_options(options, offsets, columns, log_weights, options.entries, options.num_measurements)
 
 
 @kernel

@@ -24,11 +24,11 @@ from vedette.kernels.association.predicted import Rows, expect_rows, log_or_minu
 from vedette.kernels.base.arrays import group_members
 from vedette.kernels.base.compile import borrowing, kernel
 from vedette.kernels.base.types import Floats, Ints, Mixture, ScanInput, Sensor
-from vedette.kernels.gaussian.classes import room_for_classes
 from vedette.kernels.gaussian.components import components_like, copy_component, copy_components
 from vedette.kernels.gaussian.detection import moments_if_missed
 from vedette.kernels.gaussian.innovation import copy_innovation
 from vedette.kernels.gaussian.linalg import log_add
+from vedette.kernels.gaussian.marks import room_for_updated_marks
 from vedette.kernels.gaussian.relinearisation import make_pair_work
 from vedette.kernels.gaussian.scratch import make_scratch
 
@@ -101,8 +101,8 @@ def _gated_pairs(seen: Rows, num_local: int, scan: Floats, log_clutter: Floats, 
     near = near_measurements(seen, scan, sight.sensor.periods, gate)
     num, num_rows = near.offsets[len(near.offsets) - 1], len(seen.log_absent)
     meas_dim = len(sight.sensor.periods)
-    classes = room_for_classes(scan, meas_dim, num)
-    options = make_room(0, num, num, len(scan), meas_dim, room_for_updated(seen, num), classes)
+    marks = room_for_updated_marks(scan, meas_dim, num)
+    options = make_room(0, num, num, len(scan), meas_dim, room_for_updated(seen, num), marks)
     components, filled = np.empty(num, np.int64), 0
     for c in range(num_rows):
         own = c - (num_rows - num_local)
@@ -190,8 +190,8 @@ def candidates_of(
     num, meas_dim = len(chosen.measurements), len(sensor.periods)
     rows = make_rows(num, chosen.num_pairs, seen.components, meas_dim)
     updated = room_for_updated(seen, chosen.num_pairs)
-    classes = room_for_classes(scan.measurements, meas_dim, chosen.num_pairs)
-    options = make_room(num, 2 * num, chosen.num_pairs, len(scan.measurements), meas_dim, updated, classes)
+    marks = room_for_updated_marks(scan.measurements, meas_dim, chosen.num_pairs)
+    options = make_room(num, 2 * num, chosen.num_pairs, len(scan.measurements), meas_dim, updated, marks)
     for row in range(num):
         j = chosen.measurements[row]
         rows.labels[row, 0], rows.labels[row, 1] = label[0], label[1] + j

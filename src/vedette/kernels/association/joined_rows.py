@@ -11,6 +11,7 @@ from vedette.kernels.base.arrays import grown_floats, grown_ints
 from vedette.kernels.base.compile import inlined, kernel
 from vedette.kernels.gaussian.components import copy_components
 from vedette.kernels.gaussian.innovation import copy_innovation
+from vedette.kernels.gaussian.marks import copy_marks, marks_like
 
 
 @kernel
@@ -37,7 +38,7 @@ def joined_rows(rows: Rows, options: Options, new: Rows, new_options: Options) -
         component_log_weights,
         whitened,
         room_for_updated(out, len(component_log_weights)),
-        np.empty((len(component_log_weights), options.log_class_probs.shape[1])),
+        marks_like(options.marks, len(component_log_weights)),
         options.num_measurements,
     )
     for entry in range(num_entries):
@@ -59,11 +60,10 @@ def joined_rows(rows: Rows, options: Options, new: Rows, new_options: Options) -
 
 @inlined
 def copy_entry(source: Options, entry: int, out: Options, at: int) -> None:
-    """Copy residual and class probabilities of an entry, and its updated moments if both have components that bend."""
+    """Copy residual and marks of an entry, and its updated moments if both have components that bend."""
     for a in range(source.whitened.shape[1]):
         out.whitened[at, a] = source.whitened[entry, a]
-    for k in range(source.log_class_probs.shape[1]):
-        out.log_class_probs[at, k] = source.log_class_probs[entry, k]
+    copy_marks(source.marks, entry, out.marks, at)
     if source.updated.shape[0] > 0 and out.updated.shape[0] > 0:
         for i in range(source.updated.shape[1]):
             for j in range(source.updated.shape[2]):

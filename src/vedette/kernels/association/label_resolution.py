@@ -17,10 +17,12 @@ from typing import NamedTuple
 import numpy as np
 
 from vedette.kernels.association.assignment import DualWork, Options, make_dual_work, solve_assignment
+from vedette.kernels.association.options import make_room
 from vedette.kernels.base.arrays import counted_ints, filled_ints
 from vedette.kernels.base.compile import borrowing, kernel
 from vedette.kernels.base.types import Floats, Glmb, Ints
 from vedette.kernels.gaussian.distances import pair_distances
+from vedette.kernels.gaussian.marks import no_marks
 from vedette.kernels.gaussian.mixtures import descending_order
 from vedette.kernels.gaussian.pooling import Moments, moments_of
 
@@ -48,17 +50,9 @@ class _Choice(NamedTuple):
 
 @kernel
 def _make_choice(num: int) -> _Choice:
-    options = Options(
-        np.arange(num + 1) * num,
-        np.empty(num * num, np.int64),
-        np.empty(num * num),
-        np.empty(0, np.int64),
-        np.empty(0),
-        np.empty((0, 0)),
-        np.empty((0, 0, 0)),
-        np.empty((0, 0)),
-        num,
-    )
+    options = make_room(num, num * num, 0, num, 0, np.empty((0, 1, 0)), no_marks())
+    for i in range(num + 1):
+        options.offsets[i] = i * num
     return _Choice(options, counted_ints(num), make_dual_work(num, num), np.empty(num, np.int64))
 
 

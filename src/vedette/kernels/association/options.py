@@ -11,15 +11,15 @@ from typing import NamedTuple
 import numpy as np
 
 from vedette.errors import ModelError
-from vedette.kernels.association.assignment import ABSENT, MISSED, Options
+from vedette.kernels.association.assignment import ABSENT, MISSED, Options, borrowed_options
 from vedette.kernels.association.gating import Near, near_measurements
 from vedette.kernels.association.predicted import Rows, log_or_minus_inf
 from vedette.kernels.association.truncation import Truncation
 from vedette.kernels.base.compile import borrowing, inlined, kernel
-from vedette.kernels.base.types import Floats, Ints, ScanInput, Sensor
-from vedette.kernels.gaussian.classes import room_for_classes, update_classes
+from vedette.kernels.base.types import Floats, Ints, Marks, ScanInput, Sensor
 from vedette.kernels.gaussian.detection import detection_probability, moments_if_missed
 from vedette.kernels.gaussian.innovation import copy_innovation, whiten, write_posterior
+from vedette.kernels.gaussian.marks import no_marks, room_for_updated_marks, update_marks
 from vedette.kernels.gaussian.relinearisation import Pair, PairWork, make_pair_work, update_pair
 from vedette.kernels.gaussian.row_noise import has_own_noise, log_likelihood_ratio
 
@@ -37,31 +37,24 @@ def make_options(num_rows: int, num_components: int, num_measurements: int, stat
     """Return arrays for every possible option of measurements without features of classes."""
     most_options, most_entries = num_rows * (num_measurements + 2), num_components * (num_measurements + 1)
     updated = np.empty((most_entries, state_dim + 1, state_dim))
-    classes = np.empty((most_entries, 0))
-    return make_room(num_rows, most_options, most_entries, num_measurements, meas_dim, updated, classes)
+    return make_room(num_rows, most_options, most_entries, num_measurements, meas_dim, updated, no_marks())
 
 
 @kernel
 def make_room(
-    num_rows: int,
-    most_options: int,
-    most_entries: int,
-    num_measurements: int,
-    meas_dim: int,
-    updated: Floats,
-    log_class_probs: Floats,
+    num_rows: int, num_options: int, num_entries: int, num_columns: int, meas_dim: int, updated: Floats, marks: Marks
 ) -> Options:
-    """Return arrays for this number of options and entries. updated, log_class_probs: as in `Options`."""
+    """Return arrays for this number of options, entries and measurements. updated, marks: as in `Options`."""
     return Options(
         np.zeros(num_rows + 1, np.int64),
-        np.empty(most_options, np.int64),
-        np.empty(most_options),
-        np.empty(most_options, np.int64),
-        np.empty(most_entries),
-        np.empty((most_entries, meas_dim)),
+        np.empty(num_options, np.int64),
+        np.empty(num_options),
+        np.empty(num_options, np.int64),
+        np.empty(num_entries),
+        np.empty((num_entries, meas_dim)),
         updated,
-        log_class_probs,
-        num_measurements,
+        marks,
+        num_columns,
     )
 
 
@@ -72,8 +65,8 @@ def _room_for(rows: Rows, near: Near, scan: Floats, meas_dim: int) -> Options:
     for row in range(num):
         most_entries += (rows.offsets[row + 1] - rows.offsets[row]) * (near.offsets[row + 1] - near.offsets[row] + 1)
     updated = room_for_updated(rows, most_entries)
-    classes = room_for_classes(scan, meas_dim, most_entries)
-    return make_room(num, near.offsets[num] + 2 * num, most_entries, len(scan), meas_dim, updated, classes)
+    marks = room_for_updated_marks(scan, meas_dim, most_entries)
+    return make_room(num, near.offsets[num] + 2 * num, most_entries, len(scan), meas_dim, updated, marks)
 
 
 @kernel
@@ -89,17 +82,8 @@ def room_for_updated(rows: Rows, num_entries: int) -> Floats:
 @inlined
 def view_options(options: Options, num_rows: int, num_measurements: int) -> Options:
     """Return arrays for the options of fewer rows and measurements."""
-    return Options(
-        options.offsets[: num_rows + 1],
-        options.columns,
-        options.log_weights,
-        options.entries,
-        options.component_log_weights,
-        options.whitened,
-        options.updated,
-        options.log_class_probs,
-        num_measurements,
-    )
+    offsets, columns, log_weights = options.offsets[: num_rows + 1], options.columns, options.log_weights
+    return borrowed_options(options, offsets, columns, log_weights, options.entries, num_measurements)
 
 
 @inlined
@@ -154,7 +138,7 @@ def weigh_detection(
 ) -> float:
     """Return the log weight of component `c` detected as a measurement, relative to clutter; -inf outside the gate.
 
-    Writes its whitened residual, its updated moments if it bends, and its class probabilities, at `entry`.
+    Writes its whitened residual, its updated moments if it bends, and its updated marks, at `entry`.
     """
     innovation = rows.innovation
     distance, log_norm = 0.0, innovation.log_norm[c]
@@ -169,9 +153,7 @@ def weigh_detection(
         return -math.inf
     # The predicted component times p_D g(z | x) / kappa(z), integrated over x.
     weight = rows.components.log_weights[c] + log_norm - 0.5 * distance - log_clutter
-    if out.log_class_probs.shape[1] > 0:
-        prior, posterior = rows.components.log_class_probs[c], out.log_class_probs[entry]
-        weight += update_classes(prior, measurement, innovation.predicted.shape[1], posterior)
+    weight += update_marks(rows.components.marks, c, measurement, innovation.predicted.shape[1], out.marks, entry)
     detected = innovation.prob_detection[c]
     if innovation.at_edge[c]:
         detected = _detected_there(rows, c, sight, out.whitened[entry], out.updated[entry])

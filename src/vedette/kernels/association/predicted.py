@@ -50,24 +50,9 @@ def make_rows(num_rows: int, num_components: int, like: Mixture, meas_dim: int) 
 
 @inlined
 def view_rows(rows: Rows, num: int) -> Rows:
-    """Return arrays for `num` rows of one component each."""
-    innovation = rows.innovation
-    return Rows(
-        rows.labels[:num],
-        rows.offsets[: num + 1],
-        rows.log_absent[:num],
-        borrowed_components(rows.components, 0, num),
-        Innovation(
-            innovation.predicted[:num],
-            innovation.factor[:num],
-            innovation.whitened_cross[:num],
-            innovation.covs[:num],
-            innovation.log_norm[:num],
-            innovation.prob_detection[:num],
-            innovation.at_edge[:num],
-            innovation.bends[:num],
-        ),
-    )
+    """Return arrays for `num` rows of one component each; their innovations are not cut."""
+    components = borrowed_components(rows.components, num)
+    return Rows(rows.labels[:num], rows.offsets[: num + 1], rows.log_absent[:num], components, rows.innovation)
 
 
 @borrowing

@@ -6,8 +6,7 @@ Imported when the first of them is called, compiled or read from disk.
 from __future__ import annotations
 
 from collections.abc import Callable
-from functools import partial
-from typing import Any
+from typing import Any, cast
 
 from numba import types
 from numba.core import cgutils
@@ -43,19 +42,18 @@ def shape_of(kind: Any) -> Shape:
 
 def naming(shape: Shape) -> Callable[[tuple[Any, ...]], Any]:
     """Return a function that turns the plain tuples of a shape into its named tuples."""
-    assert shape is not None
-    bundle, fields = shape
-    if not any(fields):
-        return partial(tuple.__new__, bundle)
-    inner = [(place, naming(field)) for place, field in enumerate(fields) if field]
+    names: dict[str, Any] = {"new": tuple.__new__}
 
-    def name(values: tuple[Any, ...]) -> Any:
-        named = list(values)
-        for place, of_field in inner:
-            named[place] = of_field(values[place])
-        return tuple.__new__(bundle, named)
+    def named(shape: Shape, value: str) -> str:
+        if shape is None:
+            return value
+        bundle = f"bundle_{len(names)}"
+        names[bundle], fields = shape
+        inner = "".join(f"{named(field, f'{value}[{place}]')}, " for place, field in enumerate(fields))
+        return f"new({bundle}, ({inner}))" if any(fields) else f"new({bundle}, {value})"
 
-    return name
+    # One expression of the whole shape takes half the time of a function for each bundle.
+    return cast(Callable[[tuple[Any, ...]], Any], eval(f"lambda values: {named(shape, 'values')}", names))
 
 
 class PartKernel(CPUDispatcher):  # type: ignore[misc]

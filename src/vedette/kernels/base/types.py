@@ -20,17 +20,23 @@ OWN_HEIGHT = 10  # index in a pose of the sensor's height, m; 0 in a shorter pos
 HEIGHT = 4  # index in a state [px, py, vx, vy, pz, vz] of the height, m, where a measurement depends on it
 
 
-class Mixture(NamedTuple):
-    """Gaussian components: one mixture of any total weight, or several that offsets separate.
+class Marks(NamedTuple):
+    """Optional columns of Gaussian components; a column that is not in use has no width.
 
-    All functions that make, copy, take, join or merge components are in `vedette.kernels.gaussian.components`, so that
-    a new column is added only here and there.
+    All functions that depend on the columns are in `vedette.kernels.gaussian.marks`, so that a new column is added only
+    here and there.
     """
+
+    log_class_probs: Floats  # (num, num_classes) log probability of each class of target
+
+
+class Mixture(NamedTuple):
+    """Gaussian components: one mixture of any total weight, or several that offsets separate."""
 
     log_weights: Floats  # (num,)
     means: Floats  # (num, state_dim)
     covs: Floats  # (num, state_dim, state_dim)
-    log_class_probs: Floats  # (num, num_classes) log probability of each class of target; 0 classes: not modelled
+    marks: Marks
 
 
 class Tracks(NamedTuple):

@@ -10,23 +10,29 @@ from collections.abc import Sequence
 import numpy as np
 
 from vedette.kernels.base.compile import borrowing, inlined, kernel
-from vedette.kernels.base.types import Floats, Ints, Mixture
-from vedette.kernels.gaussian.classes import merge_classes
-from vedette.kernels.gaussian.mixtures import match_all, match_components
+from vedette.kernels.base.types import Floats, Ints, Marks, Mixture
+from vedette.kernels.gaussian.marks import (
+    copy_marks,
+    joined_marks,
+    marks_between,
+    marks_like,
+    merge_marks,
+    taken_marks,
+    unmarked,
+)
+from vedette.kernels.gaussian.mixtures import choose_all, match_components
 
 
 @kernel
-def make_components(num: int, state_dim: int, num_classes: int) -> Mixture:
-    """Room for this number of components."""
-    return Mixture(
-        np.empty(num), np.empty((num, state_dim)), np.empty((num, state_dim, state_dim)), np.empty((num, num_classes))
-    )
+def make_components(num: int, dim: int, marks: Marks) -> Mixture:
+    """Room for this number of components, of states of `dim` components and with columns as in `marks`."""
+    return Mixture(np.empty(num), np.empty((num, dim)), np.empty((num, dim, dim)), marks_like(marks, num))
 
 
 @kernel
 def components_like(mixture: Mixture, num: int) -> Mixture:
-    """Room for this number of components, with states and classes as in `mixture`."""
-    return make_components(num, mixture.means.shape[1], mixture.log_class_probs.shape[1])
+    """Room for this number of components, with states and marks as in `mixture`."""
+    return make_components(num, mixture.means.shape[1], mixture.marks)
 
 
 @inlined
@@ -41,11 +47,10 @@ def copy_gaussian(means: Floats, covs: Floats, source: int, out_means: Floats, o
 
 @inlined
 def copy_component(mixture: Mixture, source: int, out: Mixture, target: int) -> None:
-    """Copy component `source` to place `target`; without its classes where `out` has none."""
+    """Copy component `source` to place `target`; without the marks for which `out` has no column."""
     out.log_weights[target] = mixture.log_weights[source]
     copy_gaussian(mixture.means, mixture.covs, source, out.means, out.covs, target)
-    for k in range(out.log_class_probs.shape[1]):
-        out.log_class_probs[target, k] = mixture.log_class_probs[source, k]
+    copy_marks(mixture.marks, source, out.marks, target)
 
 
 @inlined
@@ -56,27 +61,26 @@ def copy_components(mixture: Mixture, first: int, last: int, out: Mixture, start
     return start + last - first
 
 
-def _between(mixture: Mixture, first: int, last: int) -> Mixture:
+@kernel
+def components_between(mixture: Mixture, first: int, last: int) -> Mixture:
     """Components `first:last`, as views."""
-    return Mixture(
-        mixture.log_weights[first:last],
-        mixture.means[first:last],
-        mixture.covs[first:last],
-        mixture.log_class_probs[first:last],
-    )
+    marks = marks_between(mixture.marks, first, last)
+    return Mixture(mixture.log_weights[first:last], mixture.means[first:last], mixture.covs[first:last], marks)
 
 
-components_between = kernel(_between)
-borrowed_components = inlined(_between)  # for kernels that only borrow arrays
+@inlined
+def borrowed_components(mixture: Mixture, num: int) -> Mixture:
+    """The first `num` components, as views for kernels that only borrow arrays; their marks are not cut."""
+    return Mixture(mixture.log_weights[:num], mixture.means[:num], mixture.covs[:num], mixture.marks)
 
 
 @kernel
 def own_components(mixture: Mixture, num: int) -> Mixture:
     """The first `num` components in arrays of their own."""
-    classes = mixture.log_class_probs[:num]
-    if classes.shape[1] > 0:  # an empty array costs as much to copy as one of numbers
-        classes = classes.copy()
-    return Mixture(mixture.log_weights[:num].copy(), mixture.means[:num].copy(), mixture.covs[:num].copy(), classes)
+    marks = marks_like(mixture.marks, num)
+    for c in range(num):
+        copy_marks(mixture.marks, c, marks, c)
+    return Mixture(mixture.log_weights[:num].copy(), mixture.means[:num].copy(), mixture.covs[:num].copy(), marks)
 
 
 @kernel
@@ -102,13 +106,12 @@ def stacked_mixtures(first: Mixture, second: Mixture) -> Mixture:
 
 @inlined
 def merge_components(mixture: Mixture, chosen: Ints, weights: Floats, count: int, out: Mixture, target: int) -> None:
-    """Write the moments and mean class probabilities of the first `count` of `chosen` as one component.
+    """Write the moments and merged marks of the first `count` of `chosen` as one component.
 
     See `match_components`; its weight is not written.
     """
     match_components(chosen, weights, count, mixture.means, mixture.covs, out.means[target], out.covs[target])
-    if out.log_class_probs.shape[1] > 0:
-        merge_classes(mixture.log_class_probs, chosen, weights, count, out.log_class_probs[target])
+    merge_marks(mixture.marks, chosen, weights, count, out.marks, target)
 
 
 @borrowing
@@ -117,39 +120,25 @@ def merge_all(
 ) -> None:
     """Write the first `count` components merged into one of the given weight. components, weights: work."""
     out.log_weights[target] = log_weight
-    match_all(
-        mixture.log_weights,
-        mixture.means,
-        mixture.covs,
-        count,
-        components,
-        weights,
-        out.means[target],
-        out.covs[target],
-    )
-    if out.log_class_probs.shape[1] > 0:
-        merge_classes(mixture.log_class_probs, components, weights, count, out.log_class_probs[target])
+    choose_all(mixture.log_weights, count, components, weights)
+    merge_components(mixture, components, weights, count, out, target)
 
 
 # From Python, on arrays of the library's own.
 
 
-def components_of(log_weights: Floats, means: Floats, covs: Floats, log_class_probs: Floats | None = None) -> Mixture:
-    """New components of these weights, moments and class probabilities; None: without classes."""
-    classes = np.empty((len(log_weights), 0)) if log_class_probs is None else log_class_probs
-    return Mixture(log_weights, means, covs, classes)
+def components_of(log_weights: Floats, means: Floats, covs: Floats, marks: Marks | None = None) -> Mixture:
+    """New components of these weights, moments and marks; None: no column in use."""
+    return Mixture(log_weights, means, covs, unmarked(len(log_weights)) if marks is None else marks)
 
 
-def without_classes(mixture: Mixture) -> Mixture:
-    """The same components, of unknown class."""
-    return components_of(mixture.log_weights, mixture.means, mixture.covs)
-
-
-def taken_components(mixture: Mixture, places: Ints) -> Mixture:
+def taken_components(mixture: Mixture, places: Ints | slice) -> Mixture:
     """The components at `places`, in that order."""
-    return Mixture(*(column[places] for column in mixture))
+    log_weights, means, covs = (column[places] for column in mixture[:3])
+    return Mixture(log_weights, means, covs, taken_marks(mixture.marks, places))
 
 
 def joined_components(mixtures: Sequence[Mixture]) -> Mixture:
     """The components of all mixtures, in their order."""
-    return Mixture(*map(np.concatenate, zip(*mixtures, strict=True)))
+    log_weights, means, covs, marks = zip(*mixtures, strict=True)
+    return Mixture(np.concatenate(log_weights), np.concatenate(means), np.concatenate(covs), joined_marks(marks))

@@ -17,6 +17,7 @@ from vedette.kernels.gaussian.components import (
     stacked_mixtures,
 )
 from vedette.kernels.gaussian.linalg import cholesky, inverse_from_factor, log_det_from_factor, log_sum
+from vedette.kernels.gaussian.marks import may_merge
 from vedette.kernels.gaussian.mixtures import descending_order
 from vedette.kernels.gaussian.prediction import predict
 from vedette.kernels.gaussian.scratch import make_scratch
@@ -84,7 +85,7 @@ def _near(mixture: Mixture, left: Ints, heaviest: int, reach: float, inverse: Fl
     inverse_from_factor(factor, inverse)
     log_det, count = log_det_from_factor(factor), 1
     for c in range(len(left)):
-        if left[c] == 0 or c == heaviest:
+        if left[c] == 0 or c == heaviest or not may_merge(mixture.marks, heaviest, c):
             continue
         if _divergence(mixture, c, heaviest, inverse, log_det, reach, factor) < reach:
             out[count] = c

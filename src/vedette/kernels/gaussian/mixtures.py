@@ -140,28 +140,20 @@ def moment_match(log_weights: Floats, means: Floats, covs: Floats, out_mean: Flo
     covs: (num, state_dim, state_dim). out_mean: (state_dim,). out_cov: (state_dim, state_dim), symmetric.
     """
     count = len(log_weights)
-    match_all(log_weights, means, covs, count, np.empty(count, np.int64), np.empty(count), out_mean, out_cov)
+    components, weights = np.empty(count, np.int64), np.empty(count)
+    choose_all(log_weights, count, components, weights)
+    match_components(components, weights, count, means, covs, out_mean, out_cov)
 
 
 @borrowing
-def match_all(
-    log_weights: Floats,
-    means: Floats,
-    covs: Floats,
-    count: int,
-    components: Ints,
-    weights: Floats,
-    out_mean: Floats,
-    out_cov: Floats,
-) -> None:
-    """`moment_match` of the first `count` components. components, weights: (count,) to work in."""
+def choose_all(log_weights: Floats, count: int, components: Ints, weights: Floats) -> None:
+    """Write the indices and linear weights of the first `count` components, relative to the heaviest of them."""
     peak = -math.inf
     for c in range(count):
         peak = max(peak, log_weights[c])
     for c in range(count):
         components[c] = c
         weights[c] = math.exp(log_weights[c] - peak) if peak > -math.inf else 0.0
-    match_components(components, weights, count, means, covs, out_mean, out_cov)
 
 
 @kernel

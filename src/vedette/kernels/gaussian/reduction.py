@@ -17,6 +17,7 @@ from vedette.kernels.gaussian.components import (
     merge_components,
 )
 from vedette.kernels.gaussian.linalg import cholesky, log_sum
+from vedette.kernels.gaussian.marks import may_merge
 from vedette.kernels.gaussian.mixtures import sort_descending
 
 
@@ -68,7 +69,7 @@ def _near(heaviest: int, wide: Mixture, width: int, merge_distance: float, work:
     if not merge_distance > 0.0 or not cholesky(covs[heaviest], factor):
         return count
     for c in range(width):
-        if c == heaviest or work.left[c] == -math.inf:
+        if c == heaviest or work.left[c] == -math.inf or not may_merge(wide.marks, heaviest, c):
             continue
         squared = 0.0
         for i in range(n):  # as `solve_lower`, until the distance is known to be too great

@@ -13,6 +13,8 @@ other components.
 
 from __future__ import annotations
 
+import math
+
 from vedette.kernels.base.compile import inlined
 from vedette.kernels.base.types import Floats
 
@@ -23,6 +25,16 @@ MISSING = 1e16  # variance of a component that was not measured, SI: far above t
 def row_length(meas_dim: int) -> int:
     """Return the length of a row with noise and likelihood ratio, without ratios of classes."""
     return int(meas_dim + meas_dim * (meas_dim + 1) // 2 + 1)
+
+
+@inlined
+def largest_class_ratio(measurement: Floats, meas_dim: int) -> float:
+    """Return the largest log likelihood ratio of a class, a bound on the factor of any component; 0 without any."""
+    first = row_length(meas_dim)
+    largest = -math.inf if measurement.shape[0] > first else 0.0
+    for place in range(first, measurement.shape[0]):
+        largest = max(largest, measurement[place])
+    return largest
 
 
 @inlined

@@ -8,15 +8,16 @@ from typing import NamedTuple
 import numpy as np
 
 from vedette.kernels.base.compile import kernel
-from vedette.kernels.base.types import Floats, Lmb, Tracks
+from vedette.kernels.base.types import Floats, Lmb, Marks, Tracks
 from vedette.kernels.gaussian.components import make_components, stacked_mixtures
+from vedette.kernels.gaussian.marks import copy_marks
 
 
 class BirthsOfMeasurements(NamedTuple):
     """Parameters of births at measurements."""
 
     std: Floats  # (state_dim,) standard deviations of each target
-    log_class_probs: Floats  # (num_classes,) of each target
+    marks: Marks  # (1, ...) of each target
     expected: float  # expected total number of targets
     max_existence: float  # largest existence probability
     step: int  # with `first`, the label of the first target; the index of the others continues from there
@@ -36,7 +37,7 @@ def births_of_measurements(states: Floats, unexplained: Floats, begin: BirthsOfM
     num, dim = len(unexplained), len(begin.std)
     total = unexplained.sum()
     labels, offsets = np.empty((num, 2), np.int64), np.arange(num + 1)
-    out, logits = make_components(num, dim, len(begin.log_class_probs)), np.empty(num)
+    out, logits = make_components(num, dim, begin.marks), np.empty(num)
     for i in range(num):
         labels[i, 0], labels[i, 1] = begin.step, begin.first + i
         out.log_weights[i] = 0.0
@@ -44,7 +45,7 @@ def births_of_measurements(states: Floats, unexplained: Floats, begin: BirthsOfM
             out.means[i, d] = states[i, d]
             for e in range(dim):
                 out.covs[i, d, e] = begin.std[d] ** 2 if d == e else 0.0
-        out.log_class_probs[i] = begin.log_class_probs
+        copy_marks(begin.marks, 0, out.marks, i)
         existence = min(begin.max_existence, begin.expected * unexplained[i] / total)
         # A share may underflow to 0.
         logits[i] = math.log(existence) - math.log1p(-existence) if existence > 0.0 else -math.inf

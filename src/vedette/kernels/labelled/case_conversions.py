@@ -10,6 +10,7 @@ import numpy as np
 from vedette.kernels.base.compile import kernel
 from vedette.kernels.base.types import Floats, Glmb, Ints, Tracks
 from vedette.kernels.gaussian.components import copy_gaussian, make_components
+from vedette.kernels.gaussian.marks import no_marks
 from vedette.kernels.gaussian.reduction import MixtureCaps
 from vedette.kernels.labelled.conversions import glmb_to_lmb
 from vedette.kernels.labelled.power_integrals import SensorCases
@@ -53,7 +54,7 @@ def glmb_cases_to_lmb(
     order; a label without any set in a case gets logit -inf there, and no Gaussian.
     """
     num = len(members)
-    offsets, components = np.arange(num + 1), make_components(num, cases.means.shape[2], 0)
+    offsets, components = np.arange(num + 1), make_components(num, cases.means.shape[2], no_marks())
     tracks, caps = Tracks(members, offsets, components), MixtureCaps(-math.inf, 0.0, 1)
     components.log_weights[:] = 0.0
     for case in range(first, last):

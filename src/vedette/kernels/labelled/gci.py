@@ -14,11 +14,11 @@ from typing import NamedTuple
 import numpy as np
 
 from vedette.kernels.base.compile import kernel
-from vedette.kernels.base.types import Floats, Ints, Mixture, Tracks
-from vedette.kernels.gaussian.classes import normalise_classes
+from vedette.kernels.base.types import Floats, Ints, Marks, Mixture, Tracks
 from vedette.kernels.gaussian.components import components_like
 from vedette.kernels.gaussian.information import log_integral, log_value, row_size, to_information, to_moments
 from vedette.kernels.gaussian.linalg import cholesky, log_add, normalise_logs
+from vedette.kernels.gaussian.marks import pool_marks
 from vedette.kernels.gaussian.mixtures import require_gaussians
 from vedette.kernels.gaussian.pooling import reduced_tracks
 from vedette.kernels.gaussian.reduction import MixtureCaps
@@ -29,9 +29,11 @@ class Powers(NamedTuple):
 
     rows: Floats  # (num_components, row_size) information rows of N^w about `reference`
     log_weights: Floats  # (num_components,) w log a of each
-    log_class_probs: Floats  # (num_components, num_classes) w log p of each
+    sources: Ints  # (num_components,) place of each among the components of the tracks
     starts: Ints  # (num_sensors + 1,) start of the components of each sensor
     weights: Floats  # (num_sensors,) the powers w; 0 if the label is unknown
+    chosen: Ints  # (num_sensors,) sources of a combination, of the sensors that know the label
+    chosen_weights: Floats  # (num_sensors,) their powers
     reference: Floats  # (state_dim,) near the densities, to limit cancellation
     row: Floats  # (row_size,) of a product
     factor: Floats  # (state_dim, state_dim)
@@ -41,13 +43,15 @@ class Powers(NamedTuple):
 
 @kernel
 def _make_powers(num_sensors: int, most: int, like: Mixture) -> Powers:
-    dim, num_classes = like.means.shape[1], like.log_class_probs.shape[1]
+    dim = like.means.shape[1]
     size = row_size(dim)
     return Powers(
         np.empty((most, size)),
         np.empty(most),
-        np.empty((most, num_classes)),
+        np.empty(most, np.int64),
         np.zeros(num_sensors + 1, np.int64),
+        np.empty(num_sensors),
+        np.empty(num_sensors, np.int64),
         np.empty(num_sensors),
         np.empty(dim),
         np.empty(size),
@@ -82,19 +86,17 @@ def _load(chosen: Ints, item: int, fusion_weights: Floats, tracks: Tracks, power
             if not to_information(mean, cov, powers.reference, weight, row, factor, matrix):
                 raise FloatingPointError("covariance of a track is not positive definite")
             powers.log_weights[used] = weight * components.log_weights[c]
-            for k in range(powers.log_class_probs.shape[1]):
-                powers.log_class_probs[used, k] = weight * components.log_class_probs[c, k]
+            powers.sources[used] = c
             used += 1
         powers.starts[s + 1] = used
 
 
 @kernel
-def _multiply(powers: Powers, low: int, high: int, out: Mixture) -> None:
-    """Write the product of every combination of one component per sensor: log mass, moments, class probabilities."""
+def _multiply(marks: Marks, powers: Powers, low: int, high: int, out: Mixture) -> None:
+    """Write the product of every combination of one component per sensor: log mass, moments, marks."""
     dim, row = len(powers.reference), powers.row
     for combination in range(low, high):
-        rest, total = combination - low, 0.0
-        out.log_class_probs[combination] = 0.0
+        rest, total, count = combination - low, 0.0, 0
         for k in range(len(row)):
             row[k] = 0.0
         for s in range(len(powers.weights)):
@@ -107,10 +109,10 @@ def _multiply(powers: Powers, low: int, high: int, out: Mixture) -> None:
             total += powers.log_weights[component]
             for k in range(len(row)):
                 row[k] += powers.rows[component, k]
-            for k in range(powers.log_class_probs.shape[1]):
-                out.log_class_probs[combination, k] += powers.log_class_probs[component, k]
+            powers.chosen[count], powers.chosen_weights[count] = powers.sources[component], powers.weights[s]
+            count += 1
         positive = to_moments(row, powers.reference, out.means[combination], out.covs[combination], powers.factor)
-        total += normalise_classes(out.log_class_probs[combination])
+        total += pool_marks(marks, powers.chosen, powers.chosen_weights, count, out.marks, combination)
         out.log_weights[combination] = total + log_integral(row, dim)
         if not positive or math.isnan(out.log_weights[combination]):
             raise FloatingPointError("the product of the track densities of a label is not integrable")
@@ -201,7 +203,7 @@ def fuse_tracks(
     for item in range(num):
         low, high = offsets[item], offsets[item + 1]
         _load(chosen, item, fusion_weights, tracks, powers)
-        _multiply(powers, low, high, out)
+        _multiply(tracks.components.marks, powers, low, high, out)
         for c in range(low, high):
             if high - low > 1 and len(points) > 0:
                 out.log_weights[c] += _correct(powers, points, point_weights, out.means[c], out.covs[c])

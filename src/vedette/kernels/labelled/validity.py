@@ -65,11 +65,11 @@ def _is_gaussian(mean: Floats, cov: Floats, factor: Floats) -> bool:
 @kernel
 def _are_mixtures(tracks: Tracks) -> bool:
     """Return True if every track is a density."""
-    log_weights, means, covs, classes = tracks.components
+    log_weights, means, covs, marks = tracks.components
     num, (num_components, dim) = len(tracks.labels), means.shape
     if tracks.labels.shape[1] != 2 or dim == 0 or len(log_weights) != num_components:
         return False
-    if covs.shape != (num_components, dim, dim) or len(classes) != num_components:
+    if covs.shape != (num_components, dim, dim) or len(marks.log_class_probs) != num_components:
         return False
     if not _cuts(tracks.offsets, num, num_components, 1):
         return False
@@ -78,8 +78,8 @@ def _are_mixtures(tracks: Tracks) -> bool:
         if not _is_gaussian(means[i], covs[i], factor):
             return False
     are_normalised = True
-    for i in range(num_components if classes.shape[1] > 0 else 0):
-        are_normalised &= _sum_to_one(classes[i])
+    for i in range(num_components if marks.log_class_probs.shape[1] > 0 else 0):
+        are_normalised &= _sum_to_one(marks.log_class_probs[i])
     for track in range(num):
         are_normalised &= _sum_to_one(log_weights[tracks.offsets[track] : tracks.offsets[track + 1]])
     return are_normalised

@@ -20,6 +20,7 @@ from vedette.kernels.base.arrays import counted_ints, filled_ints
 from vedette.kernels.base.compile import inlined, kernel
 from vedette.kernels.base.types import Floats, Ints, Tracks
 from vedette.kernels.gaussian.components import borrowed_components, make_components
+from vedette.kernels.gaussian.marks import no_marks
 from vedette.kernels.gaussian.relinearisation import PairWork, make_pair_work
 from vedette.kernels.steps.assembly import Naming, make_naming
 
@@ -64,7 +65,7 @@ def has_rows(work: GlmbWork, num: int) -> bool:
 
 @kernel
 def _make_belief(num_tracks: int, num_hyps: int, num_entries: int, dim: int) -> CaseBelief:
-    room = make_components(num_tracks, dim, 0)
+    room = make_components(num_tracks, dim, no_marks())
     tracks = Tracks(np.empty((num_tracks, 2), np.int64), np.empty(num_tracks + 1, np.int64), room)
     hyps = Parents(np.empty(num_hyps + 1, np.int64), np.empty(num_entries, np.int64), np.empty(num_hyps))
     return CaseBelief(tracks, hyps, np.empty(num_hyps, np.int64))
@@ -78,7 +79,7 @@ def view_belief(belief: CaseBelief, num_tracks: int, num_hyps: int, num_entries:
         Tracks(
             tracks.labels[:num_tracks],
             tracks.offsets[: num_tracks + 1],
-            borrowed_components(tracks.components, 0, num_tracks),
+            borrowed_components(tracks.components, num_tracks),
         ),
         Parents(hyps.offsets[: num_hyps + 1], hyps.rows[:num_entries], hyps.log_weights[:num_hyps]),
         belief.groups[:num_hyps],

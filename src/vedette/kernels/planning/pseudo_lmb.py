@@ -23,6 +23,7 @@ from vedette.kernels.base.arrays import counted_ints
 from vedette.kernels.base.compile import borrowing, kernel
 from vedette.kernels.base.types import Floats, Ints, Lmb, ScanInput, Tracks
 from vedette.kernels.gaussian.components import copy_gaussian, make_components
+from vedette.kernels.gaussian.marks import no_marks
 from vedette.kernels.gaussian.relinearisation import PairWork, make_pair_work
 from vedette.kernels.planning.ideal import Decision, ideal_scan, most_targets
 from vedette.kernels.steps.lmb import fill_existence, weigh_by_existence
@@ -58,7 +59,7 @@ class LmbWork(NamedTuple):
 def _make_work(prior: Lmb, meas_dim: int, most_measurements: int) -> LmbWork:
     num, dim = prior.tracks.components.means.shape
     options = make_options(num, num, most_measurements, dim, meas_dim)
-    room = make_components(num, dim, 0)
+    room = make_components(num, dim, no_marks())
     for c in range(num):
         room.log_weights[c] = prior.tracks.components.log_weights[c]
     tracks = Tracks(prior.tracks.labels, prior.tracks.offsets, room)

@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from vedette.kernels.association.assignment import Options
+from vedette.kernels.association.assignment import Options, with_options
 from vedette.kernels.association.children import Parents
 from vedette.kernels.association.predicted import Rows
 from vedette.kernels.association.products import product_of
@@ -165,18 +165,7 @@ def _taken_options(options: Options, members: Ints, columns: Ints) -> tuple[Opti
         offsets[i + 1] = filled
     for k in range(num_columns):
         columns[measurements[k]] = -1
-    taken = Options(
-        offsets,
-        own,
-        log_weights,
-        entries,
-        options.component_log_weights,
-        options.whitened,
-        options.updated,
-        options.log_class_probs,
-        num_columns,
-    )
-    return taken, measurements[:num_columns]
+    return with_options(options, offsets, own, log_weights, entries, num_columns), measurements[:num_columns]
 
 
 @kernel

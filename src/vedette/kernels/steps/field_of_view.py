@@ -14,11 +14,11 @@ from vedette.kernels.association.options import log_clutter_at
 from vedette.kernels.association.truncation import Truncation
 from vedette.kernels.base.compile import inlined, kernel
 from vedette.kernels.base.types import Bools, Ints, Lmb, ScanInput, Sensor, Tracks
-from vedette.kernels.gaussian.classes import largest_class_ratio
 from vedette.kernels.gaussian.components import components_between, components_like, copy_components
 from vedette.kernels.gaussian.detection import detection_probability
 from vedette.kernels.gaussian.linalg import LOG_2PI, cholesky, log_det_from_factor, normalise_logs
 from vedette.kernels.gaussian.reduction import MixtureCaps, reduce_mixture
+from vedette.kernels.gaussian.row_noise import largest_class_ratio
 from vedette.kernels.gaussian.scratch import Scratch, make_scratch
 
 _NOTHING = 2.0**-54  # negligible next to 1

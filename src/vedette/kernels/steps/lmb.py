@@ -24,6 +24,7 @@ from vedette.kernels.base.compile import borrowing, inlined, kernel
 from vedette.kernels.base.types import Floats, Ints, Lmb, Mixture, Motion, ScanInput, Sensor, Tracks
 from vedette.kernels.gaussian.components import components_between, components_like, copy_component
 from vedette.kernels.gaussian.linalg import log_add, normalise_logs
+from vedette.kernels.gaussian.marks import has_marks
 from vedette.kernels.gaussian.mixtures import descending_order, require_gaussians
 from vedette.kernels.gaussian.reduction import MixtureCaps, ReductionWork, make_reduction_work, reduce_into
 from vedette.kernels.steps.assembly import write_updated
@@ -117,7 +118,7 @@ def _most_components(kept: Ints, rows: Rows, options: Options) -> tuple[int, int
 
 @kernel
 def _matched_tracks(kept: Ints, rows: Rows, options: Options, marginals: Floats) -> Tracks:
-    """Return one Gaussian for each kept row, faster than `_reduced_tracks`, which also has classes."""
+    """Return one Gaussian for each kept row, faster than `_reduced_tracks`, which also has marks."""
     num, dim = len(kept), rows.components.means.shape[1]
     widest, _ = _most_components(kept, rows, options)
     labels, offsets = np.empty((num, 2), np.int64), np.zeros(num + 1, np.int64)
@@ -204,7 +205,7 @@ def step_lmb(
     logits = np.empty(len(rows.log_absent))
     fill_existence(options, marginals, logits)
     kept, dropped = labels_to_keep(logits, reduction)
-    if reduction.mixture.max_components == 1 and rows.components.log_class_probs.shape[1] == 0:
+    if reduction.mixture.max_components == 1 and not has_marks(rows.components.marks):
         tracks = _matched_tracks(kept, rows, options, marginals)
     else:
         tracks = _reduced_tracks(kept, rows, options, marginals, reduction.mixture)

@@ -140,14 +140,9 @@ def _taken(combinations: Combinations, rows: Rows, options: Options, kept: Ints,
             grown.log_absent[filled] = -math.inf
             filled += 1
             grown.offsets[filled] = end
-    trimmed = Rows(
-        grown.labels,
-        grown.offsets,
-        grown.log_absent,
-        components_between(updated, 0, end),
-        grown.innovation,
-    )
-    return Combinations(trimmed, tracks, columns, combinations.log_absent)
+    trimmed = components_between(updated, 0, end)
+    rows = Rows(grown.labels, grown.offsets, grown.log_absent, trimmed, grown.innovation)
+    return Combinations(rows, tracks, columns, combinations.log_absent)
 
 
 @kernel
@@ -156,14 +151,10 @@ def extend_combinations(
 ) -> tuple[Combinations, SensorReport]:
     """Return the combinations after the scan of sensor `at`, whose measurements are counted from `shift` on."""
     given, meas_dim = combinations.rows, len(sensor.periods)
-    rows = Rows(
-        given.labels,
-        given.offsets,
-        given.log_absent,
-        given.components,
-        make_innovation(len(given.components.log_weights), given.components.means.shape[1], meas_dim),
-    )
-    expect_rows(sensor, scan, rows, make_scratch(given.components.means.shape[1], meas_dim))
+    num, dim = given.components.means.shape
+    innovation = make_innovation(num, dim, meas_dim)
+    rows = Rows(given.labels, given.offsets, given.log_absent, given.components, innovation)
+    expect_rows(sensor, scan, rows, make_scratch(dim, meas_dim))
     options, log_clutter, num_raised = weighed_options(rows, scan, sensor, truncation)
     kept, log_kept = _options_to_keep(combinations, options, truncation.search.max_hypotheses)
     return _taken(combinations, rows, options, kept, at, shift), SensorReport(log_clutter, num_raised, log_kept)

@@ -12,9 +12,10 @@ import numpy as np
 
 from vedette.errors import ModelError
 from vedette.kernels.base.compile import borrowing, inlined, kernel
-from vedette.kernels.base.types import Floats, Mixture, Motion, Sensor
+from vedette.kernels.base.types import Floats, Marks, Mixture, Motion, Sensor
 from vedette.kernels.gaussian.components import make_components
 from vedette.kernels.gaussian.intensities import predicted_intensity
+from vedette.kernels.gaussian.marks import copy_marks
 
 # Standard deviations of a birth's position that represent "anywhere" about a measurement: wide relative to the noise.
 WIDE = 3.0
@@ -54,7 +55,7 @@ class Undetected(NamedTuple):
     cells: Cells
     places: Floats  # (num_measurements, state_dim) states at rest at them; empty: no first detections in cells
     std: Floats  # (state_dim,) of a target that appears in a cell, about its place and at rest
-    log_class_probs: Floats  # (num_classes,) of a target that appears in a cell
+    marks: Marks  # (1, ...) of a target that appears in a cell
     step: int  # of the labels
     first_index: int  # of the label of the scan's first measurement
     birth_rate: float  # 1/s, if it is learnt and the second table is of it
@@ -157,7 +158,7 @@ def predicted_undetected(before: Undetected, motion: Motion, dt: float, arrivals
         before.cells,
         before.places,
         before.std,
-        before.log_class_probs,
+        before.marks,
         before.step,
         before.first_index,
         before.birth_rate,
@@ -190,14 +191,14 @@ def _density_at(place: Floats, cells: Cells, table: Floats) -> float:
 def intensity_at_places(undetected: Undetected) -> Mixture:
     """Gaussians (num_measurements,) of the targets in the cells about each measurement; none without tables."""
     num, dim = len(undetected.places) if len(undetected.tables) > 0 else 0, len(undetected.std)
-    classes, std = undetected.log_class_probs, undetected.std.copy()
-    out = make_components(num, dim, len(classes))
+    std, out = undetected.std.copy(), make_components(num, dim, undetected.marks)
     std[:2] *= WIDE
     for j in range(num):
         density = _density_at(undetected.places[j], undetected.cells, undetected.tables[0])
         log_area = math.log(2.0 * math.pi * std[0] * std[1])
         out.log_weights[j] = math.log(density) + log_area if density > 0.0 else -math.inf
-        out.means[j], out.covs[j], out.log_class_probs[j] = undetected.places[j], 0.0, classes
+        copy_marks(undetected.marks, 0, out.marks, j)
+        out.means[j], out.covs[j] = undetected.places[j], 0.0
         for d in range(dim):
             out.covs[j, d, d] = std[d] ** 2
     return out
