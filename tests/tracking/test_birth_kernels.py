@@ -7,6 +7,7 @@ import pytest
 
 from vedette.densities import LMB, TrackTable
 from vedette.filters.inputs import births_within
+from vedette.kernels.gaussian.marks import unmarked
 from vedette.kernels.labelled.births import BirthsOfMeasurements, births_of_measurements
 
 
@@ -22,7 +23,7 @@ def test_births_of_measurements_share_the_expected_number() -> None:
     states, unexplained = np.zeros((3, 4)), np.array([0.9, 0.2, 0.2])
     states[:, :2] = [[3.0, 4.0], [1.0, 2.0], [5.0, 6.0]]
     std = np.array([10.0, 20.0, 3.0, 4.0])
-    born = births_of_measurements(states, unexplained, BirthsOfMeasurements(std, np.empty(0), 0.65, 0.4, 7, 2))
+    born = births_of_measurements(states, unexplained, BirthsOfMeasurements(std, unmarked(1), 0.65, 0.4, 7, 2))
     assert born.tracks.labels.tolist() == [[7, 2], [7, 3], [7, 4]]
     assert born.tracks.components.means.tolist() == [[3.0, 4.0, 0.0, 0.0], [1.0, 2.0, 0.0, 0.0], [5.0, 6.0, 0.0, 0.0]]
     np.testing.assert_array_equal(born.tracks.components.covs, np.tile(np.diag(std**2), (3, 1, 1)))
