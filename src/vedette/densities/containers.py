@@ -140,8 +140,10 @@ def unchecked(container: type[_Made], *fields: Any) -> _Made:
         if type(value) is array and type(value.base) is not array and value.flags.carray:
             value = value.view()  # the common case, without a call of _held
             value.setflags(False)  # type: ignore[call-arg]  # three times as fast as by keyword
-        elif value is not None:
+        elif type(value) is array:
             value = _held(value)
+        elif type(value) is Marks:
+            value = Marks._make(map(_held, value))
         put(made, name, value)
     return made
 
@@ -156,7 +158,8 @@ def kernel_arrays(*fields: str) -> Callable[[Container], tuple[Any, ...]]:
     return attrgetter(*(f"{field}.base" for field in fields))
 
 
-_COMPONENTS = kernel_arrays("log_weights", "means", "covs", *(f"marks.{name}" for name in Marks._fields))
+COMPONENTS = ("log_weights", "means", "covs", *(f"marks.{name}" for name in Marks._fields))
+_COMPONENTS = kernel_arrays(*COMPONENTS)
 
 
 def no_components(like: Any) -> Mixture:

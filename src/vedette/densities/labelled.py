@@ -50,7 +50,7 @@ class LabelledDensity(MultiTarget):
     @property
     def state_dim(self) -> int:
         """Length of a target's state."""
-        return self.tracks.state_dim
+        return int(self.tracks.means.shape[1])
 
     @property
     def num_classes(self) -> int:

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from vedette.densities import checks
-from vedette.densities.containers import Components, for_kernel, kernel_arrays, no_components, unchecked
+from vedette.densities.containers import COMPONENTS, Components, for_kernel, kernel_arrays, no_components, unchecked
 from vedette.errors import InputError, NumericalError, VedetteError
 from vedette.internal.text import pluralise
 from vedette.kernels.base import types as kt
@@ -21,7 +21,7 @@ from vedette.kernels.gaussian.marks import merged_runs, unmarked
 from vedette.kernels.gaussian.mixtures import heaviest_of_runs
 
 UNSCANNED = -2  # replaces a measurement index
-_ARRAYS = kernel_arrays("labels", "offsets")
+_ARRAYS = kernel_arrays("labels", "offsets", *COMPONENTS)
 
 
 @dataclass(frozen=True, slots=True, repr=False)
@@ -69,8 +69,8 @@ class TrackTable(Components):
 
     def to_kernel(self) -> kt.Tracks:
         """Return the arrays as a kernel bundle."""
-        labels, offsets = _ARRAYS(self)
-        return kt.Tracks(labels, offsets, self._components())
+        labels, offsets, log_weights, means, covs, *marks = _ARRAYS(self)
+        return kt.Tracks(labels, offsets, kt.Mixture(log_weights, means, covs, kt.Marks._make(marks)))
 
     @classmethod
     def from_kernel(cls, tracks: kt.Tracks, sources: Ints | None = None) -> TrackTable:
