@@ -63,7 +63,7 @@ class Cleaning:
 
     Attributes:
         max_speed: as few reports as possible are dropped so that no two successive ones need a higher speed (jumps).
-            None: no limit [m/s].
+            none: no limit [m/s].
         region: reports outside it are removed, and a track ends where it leaves. None: everywhere.
         max_gap: a longer silence ends a track, and the next report begins another [s].
         min_speed: a track slower than this on average (path length over duration) is left out, such as a moored ship
