@@ -10,7 +10,7 @@ INTERRUPTED = 130
 
 
 def main() -> None:
-    """Run the command line; an interruption while it is imported ends as one of a command does.
+    """Run the command line. An interruption while it is imported ends as one of a command does.
 
     SIGTERM, with which services are ended, interrupts like Ctrl-C.
     """

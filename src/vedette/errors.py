@@ -1,4 +1,4 @@
-"""The errors that this library raises; each message names the field, what was expected and what came."""
+"""The errors that this library raises. Each message names the field, what was expected and what came."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ class InputError(VedetteError, ValueError):
 
 
 class MissingPackageError(InputError, ImportError):
-    """A required package is not installed; the message names the extra that installs it."""
+    """A required package is not installed. The message names the extra that installs it."""
 
 
 class ModelError(VedetteError):

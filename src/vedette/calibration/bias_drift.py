@@ -38,7 +38,7 @@ def calibrate_windows(
 
     Args:
         problem: the recording and the parameters.
-        seconds: approximate duration of a part, s; all parts have the same; inf: the whole recording.
+        seconds: approximate duration of a part, s. All parts have the same. inf: the whole recording.
         progress: see `calibrate`.
 
     Raises:
@@ -81,10 +81,10 @@ class BiasEstimatorState:
     Attributes:
         parameters: the parameters, each starting at its latest estimate.
         scans: scans of the last window, in order of arrival.
-        newest: latest time of all scans, s; None before the first.
+        newest: latest time of all scans, s, or None before the first.
         due: time from which the next estimate is due, s.
         pieces: estimates of the last windows, in order of time.
-        latest: latest calibration; None before the first.
+        latest: latest calibration, or None before the first.
         num_estimates: number of calibrations so far.
     """
 
@@ -102,12 +102,12 @@ class OnlineBiasEstimator:
     """Estimates the sensors' biases from incoming scans at regular intervals, and removes them from the scans.
 
     Biases of measurements and positions are estimated from the first full window on. Clocks, noise, detection and
-    clutter stay at the parameters' start values, as a window contains little information about them; see `warm_started`
+    clutter stay at the parameters' start values, as a window contains little information about them. See `warm_started`
     to start from a longer recording. The estimate of a window is the bias at its middle. From there it is extrapolated
     linearly through the estimate of the window before, with the change d shrunk by d^2 / (d^2 + var d).
 
     Attributes:
-        problem: the sensors and their parameters, see `vedette.scenarios.calibration.build_problem`; its recording
+        problem: the sensors and their parameters, see `vedette.scenarios.calibration.build_problem`. Its recording
             gives the zero of the bearings.
         window: duration of the scans that an estimate uses, s.
         every: time between estimates, s.
@@ -153,7 +153,7 @@ class OnlineBiasEstimator:
         return state, self.corrected(state, scan)
 
     def corrected(self, state: BiasEstimatorState, scan: SensorScan) -> SensorScan:
-        """Return the scan without the biases estimated for its time; raises as `process`."""
+        """Return the scan without the biases estimated for its time. Raises as `process`."""
         own = self._checked(scan)
         site = self.problem.with_biases(self.biases(state, own.time))[own.sensor]
         recorded_scan = RecordedScan(own.time, own.sensor, own.measurements, own.pose)

@@ -34,9 +34,9 @@ _KINDS = ("clutter", "detection", "noise", "bias")  # in the order of their test
 class ParameterEstimate(NamedTuple):
     """Estimate of a parameter.
 
-    value, ci_low, ci_high: estimate and its 95 % confidence interval; NaN limits if the search did not converge.
-    reason: why there is no estimate, as "not identifiable: ..." or "implausible: ..."; empty if there is one. kept:
-    reason to keep the assumed value although there is an estimate; empty if there is none.
+    value, ci_low, ci_high: estimate and its 95 % confidence interval, with NaN limits if the search did not converge.
+    reason: why there is no estimate, as "not identifiable: ..." or "implausible: ...", empty if there is one. kept:
+    reason to keep the assumed value although there is an estimate, empty if there is none.
     """
 
     parameter: Parameter
@@ -53,7 +53,7 @@ class ParameterEstimate(NamedTuple):
 
     @property
     def std(self) -> float:
-        """Standard deviation of a parameter on a plain scale; NaN if there is no interval."""
+        """Standard deviation of a parameter on a plain scale, or NaN if there is no interval."""
         return (self.ci_high - self.ci_low) / (2.0 * _QUANTILE)
 
 
@@ -80,7 +80,7 @@ def calibrate(
     Args:
         problem: the recording and the parameters.
         progress: called after each tracking of the recording.
-        only: the parameters to estimate, with the others fixed at their start values; None: all.
+        only: the parameters to estimate, with the others fixed at their start values. None: all.
 
     Raises:
         VedetteError: a filter cannot process the recording.
@@ -184,7 +184,7 @@ def _without(parameter: Parameter, reason: str) -> ParameterEstimate:
 
 
 def _correlated(parameters: tuple[Parameter, ...]) -> list[list[int]]:
-    """Return the groups of parameters that may be correlated: all biases; and per sensor noise, detection and clutter.
+    """Return the groups of parameters that may be correlated: all biases, and per sensor noise, detection and clutter.
 
     The information between biases and the rest is 0 if measurements are Gaussian.
     """
@@ -230,7 +230,7 @@ def _judged(
 
 
 def _why(problem: Problem, i: int, partners: list[int], is_apart: bool) -> str:
-    """Return why a parameter is not identifiable; partners: the parameters that it cannot be separated from."""
+    """Return why a parameter is not identifiable. partners: the parameters that it cannot be separated from."""
     own, alone = problem.parameters[i], len(problem.sites) == 1
     names = [f"{problem.parameters[j].label} of {problem.sites[problem.parameters[j].sensor].name}" for j in partners]
     if own.kind != "bias":

@@ -14,7 +14,7 @@ _BLOCKS = 8, 30  # least and largest number of blocks
 
 
 def blocks_of_time(times: Floats) -> Ints:
-    """(num_terms,) numbers of the blocks of terms at these times; blocks have about as many terms each."""
+    """(num_terms,) numbers of the blocks of terms at these times. Blocks have about as many terms each."""
     instants, places = np.unique(times, return_inverse=True)
     num = min(max(len(instants) // _SCANS_A_BLOCK, _BLOCKS[0]), _BLOCKS[1], len(instants))
     return np.asarray(places.ravel() * num // len(instants), np.int64)

@@ -57,7 +57,7 @@ class Guess(NamedTuple):
 def initial_guess(problem: Problem, said: Floats, asked: Sequence[int], progress: Callable[[], None]) -> Guess:
     """Return an initial guess of the parameters, and of the biases among `asked`.
 
-    The recording is tracked with noise as wide as the biases may be, then with narrower noise; biases are fitted each
+    The recording is tracked with noise as wide as the biases may be, then with narrower noise. Biases are fitted each
     time, except those that the measurements matched this time leave to the assumed motion.
     """
     values, sites = problem.values(said), problem.sites
@@ -111,7 +111,7 @@ def _widest(problem: Problem, values: Floats, asked: Sequence[int]) -> Floats:
 
 
 def _expected_stds(problem: Problem, values: Floats, pairs: MatchedMeasurements) -> Floats:
-    """(num_parameters,) standard deviations on the scales, from the numbers of measurements; the prior of a bias."""
+    """(num_parameters,) standard deviations on the scales, from the numbers of measurements, or the prior of a bias."""
     hits = np.maximum(np.bincount(pairs.sensors, minlength=len(problem.sites)), 1)
     stds = np.array([each.unknown for each in problem.parameters])
     for i, each in enumerate(problem.parameters):
@@ -132,7 +132,7 @@ def _period(problem: Problem) -> float:
 def _with_noise(problem: Problem, values: Floats, stds: Floats, rates: float | None) -> Floats:
     """Return the values with noise of these standard deviations, (num_sensors, MOST_FITTED).
 
-    rates: the same for range rates, m/s; None: as assumed.
+    rates: the same for range rates, m/s. None: as assumed.
     """
     values = values.copy()
     for i, each in enumerate(problem.parameters):
@@ -211,7 +211,7 @@ def _lasting(problem: Problem, pairs: MatchedMeasurements, apart: Sequence[int],
 def dispersion(pairs: MatchedMeasurements, s: int) -> float:
     """Return the variance between tracks of their numbers of detections, in units of that of one probability.
 
-    Uses tracks in the view of sensor `s` for `_LONG` scans or more; 1 for fewer than three of them.
+    Uses tracks in the view of sensor `s` for `_LONG` scans or more. The result is 1 for fewer than three of them.
     """
     in_view = pairs.in_view[s]
     hits = np.bincount(pairs.tracks[pairs.sensors == s], minlength=len(in_view))

@@ -1,8 +1,8 @@
 """Maximum of a log likelihood that is a sum of many terms, and its information matrix.
 
-Steps are Newton's. The curvature along each parameter is that of central differences; correlations of parameters are
+Steps are Newton's. The curvature along each parameter is that of central differences. Correlations of parameters are
 those of the terms' scores (Berndt, Hall, Hall, Hausman 1974). Steps that continue near the maximum use one-sided
-differences with the curvature known, at half the cost; a short last step needs none.
+differences with the curvature known, at half the cost. A short last step needs none.
 """
 
 from __future__ import annotations
@@ -53,7 +53,7 @@ class Maximum(NamedTuple):
 
 @dataclass(slots=True)
 class _Search:
-    """Point of the search, with what is known there; see `Maximum`. bends: (num_terms, p) minus second derivatives."""
+    """Point of the search, with what is known there. See `Maximum`. bends: (num_terms, p) minus second derivatives."""
 
     terms: Terms
     at: Floats
@@ -62,7 +62,7 @@ class _Search:
     bends: Floats
 
     def central(self) -> Floats:
-        """(num_terms, p) scores; computes the second derivatives, too."""
+        """(num_terms, p) scores. Computes the second derivatives, too."""
         ways = np.diag(self.steps)
         up = np.stack([self.terms(self.at + way) for way in ways], axis=1)
         down = np.stack([self.terms(self.at - way) for way in ways], axis=1)
@@ -75,7 +75,7 @@ class _Search:
         return np.asarray((up - self.values[:, None]) / self.steps + 0.5 * self.steps * self.bends)
 
     def advance(self, way: Floats) -> float:
-        """Move by the first share of a step that raises the sum, and return it; 0 if none does."""
+        """Move by the first share of a step that raises the sum, and return it, or 0 if none does."""
         for share in _SHARES:
             found = self.terms(self.at + share * way)
             if found.sum() > self.values.sum():
@@ -97,11 +97,11 @@ def maximise(
     Args:
         terms: (num_terms,) as a function of parameters (p,).
         start: (p,).
-        unknown: (p,) prior standard deviation of each parameter; directions in which the terms hardly change over it
+        unknown: (p,) prior standard deviation of each parameter. Directions in which the terms hardly change over it
             are not followed.
-        groups: of parameters, with second derivatives within a group; they are 0 between groups.
+        groups: of parameters, with second derivatives within a group. They are 0 between groups.
         blocks: (num_terms,) numbers of blocks of terms that are independent of each other.
-        stds: (p,) expected standard deviations of the parameters, over which differences are taken; None: unknown.
+        stds: (p,) expected standard deviations of the parameters, over which differences are taken. None: unknown.
     """
     steps = 0.1 * unknown if stds is None else np.minimum(stds, unknown)
     search = _Search(terms, start, terms(start), steps, np.zeros(0))
@@ -158,7 +158,7 @@ def stds_from_blocks(scores: Floats, cov: Floats, blocks: Ints) -> Floats:
     """(p,) standard errors of a maximum from its scores, for quantiles of the normal distribution.
 
     Terms may depend on each other within a block, as errors do that last for some scans. cov: (p, p) covariance if all
-    terms were independent; its product with the scores of a block is the influence of that block on the maximum. The
+    terms were independent. Its product with the scores of a block is the influence of that block on the maximum. The
     standard errors are inf for a single block.
     """
     influences = np.asarray(block_scores(scores, blocks) @ cov)
@@ -188,7 +188,7 @@ def covariance(information: Floats, unknown: Floats) -> tuple[Floats, Floats]:
 def conditional_maximum(maximum: Maximum, unknown: Floats, held: Sequence[bool], values: Floats) -> Floats:
     """(p,) approximate maximum with some parameters held at these values.
 
-    Uses the second derivatives, like the mean of a Gaussian conditioned on some of its components; directions that they
+    Uses the second derivatives, like the mean of a Gaussian conditioned on some of its components. Directions that they
     do not determine stay within `unknown`.
     """
     known, fixed = ~np.asarray(held), np.asarray(held)

@@ -30,10 +30,10 @@ class Parameter:
         name: as in the sensors file: "range", "noise.sigma_range".
         unit: "m", "deg", "s", "per scan", "".
         start: assumed value before estimation.
-        per_si: value that corresponds to one SI unit; negative if the sign is reversed.
+        per_si: value that corresponds to one SI unit, negative if the sign is reversed.
         scale: quantity in which intervals are symmetric: the value, its logarithm or its log-odds.
         unknown: standard deviation, on that scale, from which the parameter counts as unknown.
-        usual: standard deviation, on that scale, before any recording; inf: any value is plausible.
+        usual: standard deviation, on that scale, before any recording. inf: any value is plausible.
     """
 
     sensor: int
@@ -90,8 +90,8 @@ class Problem:
         recording: as recorded, including biases.
         sites: the sensors, with their biases except those that are parameters.
         parameters: the parameters to estimate.
-        tracker: function of the parameter values and `births`; returns a deterministic tracker for such sensors, and
-            (num_sensors,) what to add to its log likelihood per scan.
+        tracker: function of the parameter values and `births`, which returns a deterministic tracker for such sensors,
+            and (num_sensors,) what to add to its log likelihood per scan.
         births: expected births from measurements per scan, where their rate is learnt.
     """
 

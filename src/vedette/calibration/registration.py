@@ -1,7 +1,7 @@
 """Initial guess for calibration: tracks, the measurements matched with them, and the biases that fit best.
 
 Biases and straight pieces of the tracks are fitted jointly to the matched measurements by least squares with Huber
-weights; noise, detection and clutter then follow from the residuals and the unmatched measurements.
+weights. Noise, detection and clutter then follow from the residuals and the unmatched measurements.
 """
 
 from __future__ import annotations
@@ -41,9 +41,9 @@ _POSITION, _SPEED = 1e4, 30.0  # m, m/s: prior that regularises poorly determine
 class MatchedMeasurements(NamedTuple):
     """Measurements matched with tracks.
 
-    times: (n,) s. sensors, tracks: (n,) numbers. measured: (n, MOST_FITTED) the `fitted` components, then NaN; NaN also
-    where a row lacks one. poses: (n, 3) positions and heights of the sensors. states: (n, 6) predicted states of the
-    tracks, [px, py, vx, vy, pz, vz], with zeros where no height is estimated. in_view: (num_sensors, num_tracks)
+    times: (n,) s. sensors, tracks: (n,) numbers. measured: (n, MOST_FITTED) the `fitted` components, then NaN, with NaN
+    also where a row lacks one. poses: (n, 3) positions and heights of the sensors. states: (n, 6) predicted states of
+    the tracks, [px, py, vx, vy, pz, vz], with zeros where no height is estimated. in_view: (num_sensors, num_tracks)
     numbers of scans that may detect a track. false, scans: (num_sensors,) numbers of measurements without a track, and
     of scans.
     """
@@ -70,7 +70,7 @@ def match_measurements(
     """Match measurements with the tracks of a tracker.
 
     Args:
-        tracker: tracker for the sensors; draws no random numbers.
+        tracker: tracker for the sensors, which draws no random numbers.
         recording: recording without the known biases.
         sites: the sensors.
         stds: (num_sensors, MOST_FITTED) standard deviations for gating measurements around tracks.
@@ -224,8 +224,8 @@ def register(
     Args:
         pairs: the matched measurements.
         sites: the sensors.
-        asked: (num_sensors, num_biases) which biases to estimate, ordered as `BIASES`; the others are 0.
-        unknown: (num_sensors, num_biases) prior scales of the biases; undetermined ones stay near 0.
+        asked: (num_sensors, num_biases) which biases to estimate, ordered as `BIASES`. The others are 0.
+        unknown: (num_sensors, num_biases) prior scales of the biases. Undetermined ones stay near 0.
         stds: (num_sensors, MOST_FITTED) initial standard deviations of the measurements.
         period: of the slowest sensor, s.
     """
@@ -312,7 +312,7 @@ def _linearised(
 
 
 def _spreads(residuals: Floats, sensors: Ints, pieces: Ints, stds: Floats) -> Floats:
-    """(num_sensors, MOST_FITTED) robust standard deviations of residuals, at most `stds`; `stds` if there are few."""
+    """(num_sensors, MOST_FITTED) robust residual standard deviations, at most `stds`, or `stds` if there are few."""
     found = stds.copy()
     for s in range(len(stds)):
         own = residuals[(sensors == s) & (pieces >= 0)]

@@ -1,4 +1,4 @@
-"""Reads the runs of a cell into arrays, with several processes if there are many; a run is dropped once it is read."""
+"""Reads the runs of a cell into arrays, with several processes if there are many. A run is dropped once it is read."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ _A_PART = 4 * MAX_BATCH_RUNS  # runs per part; fewer are read faster than anothe
 def read_ensemble(results: CampaignResults, cell: str, runs: Sequence[int], num_workers: int) -> Ensemble:
     """Return the arrays that comparisons and reports use, from these finished runs of a cell.
 
-    num_workers: number of processes, 0 for all processors; does not change the result.
+    num_workers: number of processes, 0 for all processors. Does not change the result.
 
     Raises `InputError` for no run or a damaged one, and `VedetteError` if a process dies.
     """

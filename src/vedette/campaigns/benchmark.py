@@ -51,7 +51,7 @@ class Scene:
         role: role of the entrants on it.
         about: description in one line.
         beside: names of the library's own strategies, the reference first.
-        sensors, crowd: numbers of sensors and targets of a generated scene; else 0.
+        sensors, crowd: numbers of sensors and targets of a generated scene, else 0.
         decide_every: scans between decisions of a generated scene with sensors.
         quick: whether it is one of the scenes that together take a minute.
     """
@@ -112,7 +112,7 @@ def entrant(role: Role, text: str, *, seconds: float, folder: Path) -> Entrant:
         role: planner or tracker.
         text: the entrant in one of these forms.
         seconds: time limit of a program for an answer.
-        folder: working directory of commands; file names are relative to it.
+        folder: working directory of commands. File names are relative to it.
 
     Raises `InputError` for another text, or a name that is unfit for a folder or used by the library.
     """
@@ -133,7 +133,7 @@ def entrant(role: Role, text: str, *, seconds: float, folder: Path) -> Entrant:
 
 
 def campaign_of(scene: Scene, entrant: Entrant | None, runs: int, seed: int, folder: Path, **how: Any) -> Campaign:
-    """Return the campaign of a scene for an entrant; None: for the library's own strategies.
+    """Return the campaign of a scene for an entrant. None: for the library's own strategies.
 
     folder: folder of the benchmark. how: see `resolve`.
     """

@@ -28,11 +28,11 @@ _SECTIONS = {"filter": "filter.kind", "fusion": "fusion.kind"}
 
 @dataclass(frozen=True, slots=True)
 class Cell:
-    """One strategy in one setting; its runs are numbered from 0.
+    """One strategy in one setting. Its runs are numbered from 0.
 
     Attributes:
         name: unique in the campaign, and fit for a file name.
-        settings: value of each axis; all cells of a campaign have the same axes.
+        settings: value of each axis. All cells of a campaign have the same axes.
         scenario: scenario with the fields of the cell set.
         planner: name of the strategy.
     """
@@ -56,9 +56,9 @@ class Campaign(SummaryRepr):
         name, seed, num_runs: as specified.
         cells: in the order of the specification, the last axis fastest.
         axes: each axis and its values.
-        compare: the axis whose values are compared; the first value is the reference.
+        compare: the axis whose values are compared. The first value is the reference.
         spec: the specification as plain data, including defaults.
-        shard: the shard of the runs to execute; by default all.
+        shard: the shard of the runs to execute, by default all.
     """
 
     name: str
@@ -161,7 +161,7 @@ def resolve(
         approve: receives the scenario of each cell before code that it names is run, and may raise.
 
     Raises:
-        InputError: a missing scenario, an unknown field path, or an invalid combination; the message names the cell.
+        InputError: a missing scenario, an unknown field path, or an invalid combination. The message names the cell.
     """
     axes = spec.axes()
     loaded = {name: _load(name, number, Path(folder)) for number, name in enumerate(spec.scenarios)}
@@ -192,7 +192,7 @@ def _cell(
     changed: dict[str, Scenario],
     approve: Callable[[Scenario], None],
 ) -> Cell:
-    """Return a cell; `changed` caches scenarios by their fields, as strategies share them."""
+    """Return a cell. `changed` caches scenarios by their fields, as strategies share them."""
     fields = dict(spec.set)
     fields |= {_SECTIONS[axis]: settings[axis] for axis in _SECTIONS if axis in settings}
     for variant in spec.variants:

@@ -140,7 +140,7 @@ class RemoteWorkers:
 
 
 def _address_in(file: Path) -> str:
-    """Return the address in a scheduler file; raises `InputError` if there is none within the time limit."""
+    """Return the address in a scheduler file. Raises `InputError` if there is none within the time limit."""
     problem = "it is not there"
     for _ in range(round(_CONNECT_SECONDS / _POLL_SECONDS)):
         try:

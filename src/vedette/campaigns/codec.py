@@ -24,7 +24,7 @@ _UNIX = 3
 
 
 def encode(record: RunRecord) -> bytes:
-    """Return a run as bytes, without its timings; equal runs give equal bytes.
+    """Return a run as bytes, without its timings. Equal runs give equal bytes.
 
     Raises `InputError` for a record that contradicts itself or holds an invalid plan.
     """
@@ -48,7 +48,7 @@ def decode(payload: bytes, timings: bytes | None = None) -> RunRecord:
 
 
 def decode_summary(payload: bytes, timings: bytes | None = None) -> RunSummary:
-    """Return the summary of a run, in a third of the time of `decode`; raises as `decode`."""
+    """Return the summary of a run, in a third of the time of `decode`. Raises as `decode`."""
     facts, members = _members(payload, {_RUN, *serialization.SUMMARY_FILES})
     return serialization.decode_summary(facts, members, "run", timings)
 

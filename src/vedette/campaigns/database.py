@@ -45,7 +45,7 @@ class Failure:
 
 
 class Reader:
-    """Reader of the SQLite file of a folder, also while a writer adds to it; reopens the file for every query."""
+    """Reader of the SQLite file of a folder, also while a writer adds to it. Reopens the file for every query."""
 
     def __init__(self, folder: Path) -> None:
         self._path = folder / DATABASE
@@ -84,7 +84,7 @@ class Reader:
         return entry
 
     def entries(self, cell: str, runs: Sequence[int]) -> Iterator[Entry]:
-        """Yield finished runs of a cell, read a few hundred at a time; raises as `entry`."""
+        """Yield finished runs of a cell, read a few hundred at a time. Raises as `entry`."""
         for start in range(0, len(runs), _AT_ONCE):
             batch = runs[start : start + _AT_ONCE]
             question = f"SELECT {COLUMNS} FROM runs WHERE cell = ? AND run IN ({', '.join('?' * len(batch))})"
@@ -184,5 +184,5 @@ def _advice(path: Path, error: Exception) -> str:
 
 
 def _code(error: Exception) -> int:
-    """Return SQLite's extended error code; -1 for errors of Python's own layer."""
+    """Return SQLite's extended error code, or -1 for errors of Python's own layer."""
     return int(getattr(error, "sqlite_errorcode", -1))

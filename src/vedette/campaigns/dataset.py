@@ -57,6 +57,6 @@ def dataset_of_scans(campaign: Campaign, scans: pa.Table | None) -> xarray.Datas
 
 
 def _values(campaign: Campaign, axis: str) -> list[Any]:
-    """Return the values of an axis by cell; booleans as text, as NetCDF has none."""
+    """Return the values of an axis by cell, booleans as text, as NetCDF has none."""
     values = [setting_of(campaign, cell, axis) for cell in campaign.cells]
     return [str(value) if isinstance(value, bool) else value for value in values]

@@ -25,7 +25,7 @@ class Workers(Protocol):
         ...
 
     def next(self) -> list[tuple[Task, TaskOutcome | WorkerDied]]:
-        """Return the tasks that have ended, with their outcomes; waits for at least one.
+        """Return the tasks that have ended, with their outcomes. Waits for at least one.
 
         The outcome is `WorkerDied` if two workers in a row died, or may have died, of the task.
 
@@ -57,7 +57,7 @@ def in_process(queue: TaskQueue) -> Iterator[TaskOutcome]:
 
 
 def on_workers(workers: Workers, queue: TaskQueue) -> Iterator[TaskOutcome]:
-    """Yield the outcome of every run in order of completion; runs that end at the same time in one batch.
+    """Yield the outcome of every run in order of completion, with runs that end at the same time in one batch.
 
     Runs of a worker that died are repeated by another.
 

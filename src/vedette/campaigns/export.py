@@ -20,7 +20,7 @@ NETCDF = "scans.nc"
 
 
 def export_tables(results: CampaignResults | RunRecord, folder: Path | str) -> tuple[Path, ...]:
-    """Write each table as `<name>.parquet` into a folder; return the files.
+    """Write each table as `<name>.parquet` into a folder, and return the files.
 
     Each file is written atomically and replaces one of that name. Equal results give equal bytes with the same version
     of pyarrow, except for `timings.parquet`. No file is written if no run is finished.
@@ -39,7 +39,7 @@ def _write_parquet(tables: Iterator[pa.Table], schema: pa.Schema, file: BinaryIO
 
 
 def export_csv(results: CampaignResults | RunRecord, folder: Path | str) -> tuple[Path, ...]:
-    """Write the same tables as `<name>.csv`; otherwise as `export_tables`.
+    """Write the same tables as `<name>.csv`, otherwise as `export_tables`.
 
     Text that a spreadsheet would run as a formula gets a leading apostrophe (`spreadsheet_text`).
     """

@@ -48,7 +48,7 @@ class Writer:
         database.check_contents(self._path, rows, contents)
 
     def put(self, rows: Sequence[Row], session: int) -> None:
-        """Store runs, all or none; when this returns they survive any failure of this process or machine.
+        """Store runs, all or none. When this returns they survive any failure of this process or machine.
 
         Args:
             rows: the runs.
@@ -99,7 +99,7 @@ class Writer:
         self._change(cell, run, where, *pack(cell, run, metrics))
 
     def copy_missing(self, others: Iterable[tuple[database.Reader, Callable[[int], int]]]) -> int:
-        """Copy the runs of other folders that are missing here, in one transaction; return their number.
+        """Copy the runs of other folders that are missing here, in one transaction, and return their number.
 
         Args:
             others: readers, each with a function from its session numbers to those of this folder.
@@ -120,7 +120,7 @@ class Writer:
             return num_taken
 
     def _copy_missing(self, reader: database.Reader, row: tuple[Any, ...]) -> bool:
-        """Copy a run; return True if it was new."""
+        """Copy a run, and return True if it was new."""
         if self._database.execute(_INSERT.replace("INSERT", "INSERT OR IGNORE", 1), row).rowcount:
             return True
         stored_checksum = "SELECT payload_sha256 FROM runs WHERE cell = ? AND run = ?"

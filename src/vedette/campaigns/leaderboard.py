@@ -39,12 +39,12 @@ class LeaderboardRow:
         num_runs, num_lost: number of runs, and of those that could not be finished.
         ospa: mean over scans and runs, with its 95 % interval.
         tail: median and worst run of the same, and the share of runs that end with a lost target.
-        difference: paired difference in OSPA to the first strategy; None: it is the first.
-        cardinality_error: mean number of estimates minus that of targets; NaN: no run was finished.
-        nees: mean NEES of positions over 2, with its interval: 1 if covariances are consistent; None: estimates have no
+        difference: paired difference in OSPA to the first strategy. None: it is the first.
+        cardinality_error: mean number of estimates minus that of targets. NaN: no run was finished.
+        nees: mean NEES of positions over 2, with its interval: 1 if covariances are consistent. None: estimates have no
             covariances.
-        seconds: median wall time of a decision, or of the filters and fusion of a scan, s; includes that of a program.
-        counts: mean number per decision of each of `COUNTED`; NaN: not known.
+        seconds: median wall time of a decision, or of the filters and fusion of a scan, s, also of a program.
+        counts: mean number per decision of each of `COUNTED`. NaN: not known.
         reason: reason why the first lost run was lost.
     """
 
@@ -82,7 +82,7 @@ class SceneTable:
 
 
 def scene_table(scene: Scene, folder: Path) -> SceneTable | None:
-    """Return the table of a scene from the folder of a benchmark; None if the first strategy has no run there."""
+    """Return the table of a scene from the folder of a benchmark, or None if the first strategy has no run there."""
     place = folder / scene.name
     folders = [each for each in sorted(place.iterdir()) if each.is_dir()] if place.is_dir() else []
     opened = [open_results(each) for each in sorted(folders, key=lambda each: (each.name != OWN, each.name))]
@@ -100,7 +100,7 @@ def scene_table(scene: Scene, folder: Path) -> SceneTable | None:
 
 
 def _tried(scene: Scene, results: CampaignResults) -> Iterator[tuple[LeaderboardRow, dict[int, float]]]:
-    """Yield the row of each strategy with runs, without a difference; and its OSPA by run, lost runs at the cutoff."""
+    """Yield the row of each strategy with runs, without a difference, and its OSPA by run, lost runs at the cutoff."""
     for cell in results.campaign.cells:
         label = str(cell.settings["planner" if scene.role == "planner" else "variant"])
         lost = {each.run: each.message for each in results.failures() if each.cell == cell.name}
@@ -142,7 +142,7 @@ def _spent(scene: Scene, ensemble: Ensemble) -> Floats:
 
 
 def _difference(ospa: Mapping[int, float], first: Mapping[int, float]) -> Summary | None:
-    """Return the paired difference of a strategy to the first, over their common runs; None without any."""
+    """Return the paired difference of a strategy to the first, over their common runs, or None without any."""
     common = sorted(ospa.keys() & first.keys())
     if not common:
         return None
@@ -164,7 +164,7 @@ def header(table: SceneTable) -> tuple[str, ...]:
 
 
 def row(table: SceneTable, standing: LeaderboardRow) -> tuple[str, ...]:
-    """Return one row under `header`; empty cells where values are not known."""
+    """Return one row under `header`, with empty cells where values are not known."""
     more, nees = standing.difference, standing.nees
     counts = [_known(standing.counts[name], ",.0f") for name in COUNTED] if table.scene.role == "planner" else []
     return (
@@ -188,7 +188,7 @@ def _known(value: float, form: str) -> str:
 
 
 def _interval(summary: Summary, form: str) -> str:
-    """Return the interval in words; empty for fewer than `_LEAST_RUNS` runs."""
+    """Return the interval in words, empty for fewer than `_LEAST_RUNS` runs."""
     return (
         ""
         if np.isnan(summary.low) or summary.num_runs < _LEAST_RUNS

@@ -27,7 +27,7 @@ _FILES, _FILES_A_WORKER = 40, 10  # open files, with a margin: measured 16 with 
 
 @contextmanager
 def local_workers(num_workers: int, tell: Callable[[str], None]) -> Iterator[LocalWorkers]:
-    """Context manager with `num_workers` worker processes on this machine; one that dies is replaced.
+    """Context manager with `num_workers` worker processes on this machine. One that dies is replaced.
 
     tell: receives messages about workers that died.
 
@@ -117,7 +117,7 @@ class LocalWorkers:
         self._workers: list[_Worker] = []
 
     def start(self, num_workers: int) -> None:
-        """Start this number of processes; raises `VedetteError` if the operating system refuses."""
+        """Start this number of processes. Raises `VedetteError` if the operating system refuses."""
         for _ in range(num_workers):
             self._workers.append(_Worker.start())
 
@@ -154,7 +154,7 @@ class LocalWorkers:
             worker.end()
 
     def _collect(self, worker: _Worker) -> None:
-        """Collect the results of a worker; if it died, its unfinished tasks are left."""
+        """Collect the results of a worker. If it died, its unfinished tasks are left."""
         for future in [each for each in worker.tasks if each.done()]:
             error = future.exception()
             if error is None:

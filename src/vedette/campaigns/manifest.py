@@ -53,7 +53,7 @@ class _CellEntry(BaseModel):
 
 
 class _Manifest(BaseModel):
-    """Form of a manifest; `campaign_of` checks that its parts are consistent."""
+    """Form of a manifest. `campaign_of` checks that its parts are consistent."""
 
     model_config = ConfigDict(strict=True)
     name: str
@@ -208,7 +208,7 @@ def _check_same_as(specification: CampaignSpec, manifest: Mapping[str, Any]) -> 
 
 
 def _cell(entry: Mapping[str, Any], read: dict[str, Scenario]) -> Cell:
-    """Return a cell; `read` caches the scenarios by their texts, as strategies share them."""
+    """Return a cell. `read` caches the scenarios by their texts, as strategies share them."""
     text = entry["scenario"]
     if text not in read:
         place = f"cell {entry['name']}"
@@ -220,7 +220,7 @@ def _cell(entry: Mapping[str, Any], read: dict[str, Scenario]) -> Cell:
 
 
 def _difference(place: str, there: Any, here: Any) -> str:
-    """Return in words where two pieces of plain data first differ; empty if they do not."""
+    """Return in words where two pieces of plain data first differ, empty if they do not."""
     if isinstance(there, dict) and isinstance(here, dict):
         parts = [(f"{place}.{key}", there.get(key), here.get(key)) for key in (*there, *(here.keys() - there.keys()))]
     elif isinstance(there, list) and isinstance(here, list) and len(there) == len(here):

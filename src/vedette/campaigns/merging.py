@@ -37,7 +37,7 @@ class MergeResult:
     Attributes:
         results: results of the merged folder.
         num_added: runs that this call added.
-        count: number of shards of the campaign; 1 if it was not split.
+        count: number of shards of the campaign, or 1 if it was not split.
         missing: numbers of the shards with runs that no folder holds, increasing.
         num_missing: number of these runs.
         shards: folder that contains the folders of the shards.
@@ -52,7 +52,7 @@ class MergeResult:
 
 
 def merge(folders: Sequence[Path | str], out: Path | str | None = None, *, tables: bool = True) -> MergeResult:
-    """Merge results folders of shards; the runs equal those of a single process, byte for byte.
+    """Merge results folders of shards. The runs equal those of a single process, byte for byte.
 
     Runs that several folders hold are taken once. Folders of unfinished shards are accepted: the same call later adds
     the runs done since.
@@ -60,7 +60,7 @@ def merge(folders: Sequence[Path | str], out: Path | str | None = None, *, table
     Args:
         folders: folders of shards, or folders that contain such folders. Whole results folders of the campaign are
             accepted too.
-        out: folder for the results; new, empty, or of the same campaign. None: named after the campaign.
+        out: folder for the results, new, empty, or of the same campaign. None: named after the campaign.
         tables: also write the tables for other tools, if no run is missing.
 
     Raises:
@@ -83,7 +83,7 @@ def merge(folders: Sequence[Path | str], out: Path | str | None = None, *, table
 
 
 def _lacking(results: CampaignResults, count: int) -> Ints:
-    """(count + 1,) number of missing runs of each shard; by columns, as there may be a million runs."""
+    """(count + 1,) number of missing runs of each shard, by columns, as there may be a million runs."""
     campaign, done = results.campaign, defaultdict[str, list[int]](list)
     for name, run in Reader(results.folder).finished():
         done[name].append(run)
@@ -109,7 +109,7 @@ def _places(folders: Sequence[Path | str]) -> list[Path]:
 
 @dataclass(frozen=True, slots=True)
 class _Share:
-    """Parts of a shard's manifest; the manifests of a thousand folders may not fit in memory."""
+    """Parts of a shard's manifest. The manifests of a thousand folders may not fit in memory."""
 
     folder: Path
     shard: Shard
@@ -118,7 +118,7 @@ class _Share:
 
 
 def _read(places: Sequence[Path]) -> tuple[dict[str, Any], list[_Share]]:
-    """Return the merged manifest; raises `InputError`, naming the folder, for one of another campaign."""
+    """Return the merged manifest. Raises `InputError`, naming the folder, for one of another campaign."""
     merged: dict[str, Any] = {}
     shares: list[_Share] = []
     for place in places:
@@ -150,7 +150,7 @@ def _joined(place: Path, manifest: dict[str, Any], merged: dict[str, Any]) -> di
 
 
 def _fill(target: Path, merged: dict[str, Any], shares: Sequence[_Share]) -> int:
-    """Copy the runs into the target; return how many are new."""
+    """Copy the runs into the target, and return how many are new."""
     make_folder(target)
     started = (target / MANIFEST).exists()
     writer = Writer(target)

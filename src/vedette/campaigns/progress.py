@@ -23,7 +23,7 @@ class Progress(ProgressObserver):
     """Progress display: finished runs, rate, remaining time, and running mean error of the compared strategies.
 
     A context manager to pass to `run_campaign` as its `progress`. In a notebook the line is updated in place if
-    ipywidgets is installed; otherwise one is printed every 15 s.
+    ipywidgets is installed. Otherwise one is printed every 15 s.
     """
 
     def __init__(self, campaign: Campaign, console: Console | None = None) -> None:
@@ -31,7 +31,7 @@ class Progress(ProgressObserver):
 
         Args:
             campaign: the campaign to run.
-            console: rich console to write to; None: standard error, in a notebook the output of the cell.
+            console: rich console to write to. None: standard error, in a notebook the output of the cell.
         """
         from rich.console import Console
         from rich.progress import BarColumn, TextColumn

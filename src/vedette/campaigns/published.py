@@ -24,7 +24,7 @@ _PUBLISHED = Path(__file__).with_name("published.toml")
 
 
 class PublishedOrder(NamedTuple):
-    """Published claim that strategy `better` has a smaller error than strategy `than`; `text` states it in words."""
+    """Published claim that strategy `better` has a smaller error than strategy `than`. `text` states it in words."""
 
     text: str
     better: str
@@ -54,7 +54,7 @@ class PublishedComparison:
     Attributes:
         spec: specification of the campaign, which has the name of the comparison.
         title: topic in one line.
-        source: source of the published figures; empty if there are none.
+        source: source of the published figures, empty if there are none.
         remark: differences between the published figures and those of the campaign.
         published: published methods, the best first.
         claims, decisions: other published statements: orders of strategies, and actions.
@@ -88,7 +88,7 @@ def published_comparisons() -> dict[str, PublishedComparison]:
 
 
 def published_comparison_of(campaign: Campaign) -> PublishedComparison | None:
-    """Return the published comparison that a campaign runs; None for other campaigns."""
+    """Return the published comparison that a campaign runs, or None for other campaigns."""
     match = published_comparisons().get(campaign.name)
     return match if match is not None and list(match.spec.scenarios) == list(campaign.axes["scenario"]) else None
 
@@ -129,7 +129,7 @@ def _checked_decisions(reference: PublishedComparison, comparison: Comparison) -
 
 
 def _published(row: dict[str, str | float]) -> StrategyScore:
-    """Return the score in a row of the file; missing values are None."""
+    """Return the score in a row of the file. Missing values are None."""
 
     def number(key: str) -> float | None:
         return float(row[key]) if key in row else None

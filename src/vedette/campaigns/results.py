@@ -55,7 +55,7 @@ class GroupComparison:
 class CampaignResults(SummaryRepr):
     """Finished runs of a campaign. Runs are read on demand, and their checksums verified each time.
 
-    Every method that reads runs raises `InputError` for a damaged one; the message names file, cell and run.
+    Every method that reads runs raises `InputError` for a damaged one. The message names file, cell and run.
 
     Attributes:
         folder: the results folder.
@@ -91,7 +91,7 @@ class CampaignResults(SummaryRepr):
         return tuple(run for run in self.campaign.runs(place) if run not in done)
 
     def failures(self) -> tuple[Failure, ...]:
-        """Return the runs that could not be finished, with the place and reason; by cell and run.
+        """Return the runs that could not be finished, with the place and reason, by cell and run.
 
         The command that runs the campaign tries them again.
         """
@@ -123,7 +123,7 @@ class CampaignResults(SummaryRepr):
     def ensemble(self, cell: str, runs: Sequence[SupportsIndex] | None = None) -> Ensemble:
         """Return the arrays that comparisons and reports use, from finished runs of a cell.
 
-        runs: increasing numbers of the runs; None: all. Raises `InputError` for no run.
+        runs: increasing numbers of the runs. None: all. Raises `InputError` for no run.
         """
         selected = self.finished(cell) if runs is None else tuple(map(operator.index, runs))
         return read_ensemble(self, cell, selected, 1 if self._own else self._num_workers)
@@ -138,7 +138,7 @@ class CampaignResults(SummaryRepr):
         return tuple(filter(None, map(self._comparison, self.campaign.groups())))
 
     def title(self, group: GroupComparison) -> str:
-        """Return the settings that distinguish a group from the others, such as "fusion clmb"; empty for a single
+        """Return the settings that distinguish a group from the others, such as "fusion clmb", empty for a single
         group.
         """
         several = {axis for axis, values in self.campaign.axes.items() if len(values) > 1}
@@ -147,7 +147,7 @@ class CampaignResults(SummaryRepr):
     def tables(self) -> dict[str, pyarrow.Table]:
         """Return runs, scans, decisions, actions, rewards, tracks, truth, sensors and timings as Arrow tables.
 
-        Use `.to_pandas()` for pandas, `polars.from_arrow` for polars; DuckDB queries them directly. See
+        Use `.to_pandas()` for pandas, `polars.from_arrow` for polars. DuckDB queries them directly. See
         `vedette.campaigns.tables`. Empty if no run is finished.
         """
         return concatenated_tables(self.table_parts())
@@ -162,7 +162,7 @@ class CampaignResults(SummaryRepr):
             yield tables_of_runs(self.campaign, batch)
 
     def dataset(self) -> xarray.Dataset:
-        """Return the metrics at each scan as arrays over cell, run and step; see `vedette.campaigns.dataset`.
+        """Return the metrics at each scan as arrays over cell, run and step. See `vedette.campaigns.dataset`.
 
         Raises `InputError` if xarray is not installed.
         """
@@ -170,7 +170,7 @@ class CampaignResults(SummaryRepr):
         return dataset_of_scans(self.campaign, scans.get("scans"))
 
     def _finished(self) -> list[tuple[str, int]]:
-        """Return cell and number of every finished run, sorted; raises `InputError` for one outside the campaign."""
+        """Return cell and number of every finished run, sorted. Raises `InputError` for one outside the campaign."""
         finished = self._reader.finished()
         names = {cell.name for cell in self.campaign.cells}
         for cell, run in finished:
@@ -238,9 +238,9 @@ def open_results(
     Args:
         folder: folder that is finished, unfinished, or being written.
         metrics: custom metrics to compute for every run that is read, in addition to the stored ones.
-        campaign: campaign of the folder, if known, so that its scenarios need not be read; else None.
+        campaign: campaign of the folder, if known, so that its scenarios need not be read, else None.
         num_workers: number of processes that read thousands of runs, in a program that guards its main module as
-            `multiprocessing` demands; 0: one per processor. It does not change results.
+            `multiprocessing` demands. 0: one per processor. It does not change results.
 
     Raises `InputError`, naming the file, for a folder without a campaign, or with a manifest or runs that are missing,
     cut short or altered.

@@ -34,7 +34,7 @@ def pack(cell: str, run: int, content: bytes) -> Packed:
 def unpack(packed: bytes, max_bytes: int = MOST_BYTES) -> bytes:
     """Return the content of bytes packed by zstd or, in older files, by zlib. Raises `ValueError` for others.
 
-    A zstd frame states its unpacked size (RFC 8878, 3.1.1.1); larger ones are refused before memory is allocated.
+    A zstd frame states its unpacked size (RFC 8878, 3.1.1.1). Larger ones are refused before memory is allocated.
     """
     max_bytes = min(max_bytes, _SMALL + _MOST_TIMES * len(packed))
     if packed[: len(_MAGIC)] != _MAGIC:
@@ -59,7 +59,7 @@ class Row:
     Attributes:
         cell, run: identify the run.
         payload, timings: the run, and its timings.
-        metrics: metrics of the run; empty before packing if there are none, as they can be computed later.
+        metrics: metrics of the run, empty before packing if there are none, as they can be computed later.
     """
 
     cell: str
@@ -102,7 +102,7 @@ class Entry:
 
 
 def verified(values: tuple[Any, ...]) -> Entry | None:
-    """Return the run from the columns of the store; None if it is damaged."""
+    """Return the run from the columns of the store, or None if it is damaged."""
     cell, run, session, *packed = values
     if not isinstance(cell, str) or not isinstance(run, int) or not isinstance(session, int):
         return None

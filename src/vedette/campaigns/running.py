@@ -30,7 +30,7 @@ TABLES = "tables"
 
 
 class ProgressObserver(Protocol):
-    """Observer of a running campaign; see `Progress`."""
+    """Observer of a running campaign. See `Progress`."""
 
     def begin(self, num_existing: int, num_runs: int) -> None:
         """Receives the number of runs that exist already and the total number of runs."""
@@ -60,7 +60,7 @@ class CampaignOutcome:
     Attributes:
         num_completed: runs that this call added.
         num_existing: runs that existed before.
-        failed: runs that could not be finished; the same call tries them again.
+        failed: runs that could not be finished. The same call tries them again.
     """
 
     num_completed: int
@@ -85,19 +85,19 @@ def run_campaign(
 
     Args:
         campaign: see `vedette.campaigns.resolve`.
-        folder: folder for the results; new, empty, or of the same campaign.
-        num_workers: processes on this machine; 1: only this process. With a scheduler: number of workers to wait for
+        folder: folder for the results, new, empty, or of the same campaign.
+        num_workers: processes on this machine. 1: only this process. With a scheduler: number of workers to wait for
             before the first run.
         scheduler: address of a dask scheduler whose workers execute the runs instead, or the file that it writes
-            (`--scheduler-file`); each worker has this version installed.
+            (`--scheduler-file`). Each worker has this version installed.
         redo_damaged: repeat runs that were altered in the folder after they were stored, instead of refusing to
             continue.
         progress: observer of the progress.
 
     Raises:
-        InputError: the folder holds something else, another campaign, or damaged results; no scheduler answers at the
-            address.
-        VedetteError: the disk is full, or the scheduler is lost; stored runs are safe.
+        InputError: the folder holds something else, another campaign, or damaged results, or no scheduler answers at
+            the address.
+        VedetteError: the disk is full, or the scheduler is lost. Stored runs are safe.
     """
     if getattr(current_process(), "_inheriting", False):
         raise VedetteError(
@@ -138,7 +138,7 @@ def run_campaign(
 
 
 def _check_undamaged(store: Store, redo: bool, progress: ProgressObserver) -> None:
-    """Raise `InputError` if a finished run was altered; with `redo` discard it instead, so that it is repeated."""
+    """Raise `InputError` if a finished run was altered. With `redo` discard it instead, so that it is repeated."""
     damaged = store.damaged()
     names = ", ".join(f"{cell} {run}" for cell, run in damaged)
     if damaged and not redo:

@@ -22,12 +22,12 @@ class StrategyScore:
     Attributes:
         label: name of the strategy.
         ospa: mean over scans and runs, in the unit of the comparison.
-        standard_error: standard error of `ospa` over the runs; None: not known.
-        worst: largest mean over the scans of a run; None: not known.
-        difference: paired difference to the first strategy; None: it is the first, or not paired with it.
+        standard_error: standard error of `ospa` over the runs. None: not known.
+        worst: largest mean over the scans of a run. None: not known.
+        difference: paired difference to the first strategy. None: it is the first, or not paired with it.
         cardinality_error: mean number of estimates minus that of targets.
-        tracked: mean share of all targets, in view or not, with an estimate within the cutoff; None: not measured.
-        decision_seconds: wall time of a decision of all sensors, s: median over decisions and runs; for a published
+        tracked: mean share of all targets, in view or not, with an estimate within the cutoff. None: not measured.
+        decision_seconds: wall time of a decision of all sensors, s: median over decisions and runs, and for a published
             method the published value. None: no decisions.
         num_runs: number of runs.
     """
@@ -44,7 +44,7 @@ class StrategyScore:
 
 
 def score_strategies(group: GroupComparison) -> tuple[StrategyScore, ...]:
-    """Return the scores of the strategies of a group, over its common runs, in its order; the first is the
+    """Return the scores of the strategies of a group, over its common runs, in its order. The first is the
     reference.
     """
     comparison, scores = group.comparison, []
@@ -74,7 +74,7 @@ def score_header(unit: str, reference: str) -> tuple[str, ...]:
 
 
 def score_row(score: StrategyScore) -> tuple[str, ...]:
-    """Return one row under `score_header`; empty cells where values are not known."""
+    """Return one row under `score_header`, with empty cells where values are not known."""
     more = score.difference
     return (
         score.label,

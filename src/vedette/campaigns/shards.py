@@ -18,7 +18,7 @@ _Runs = TypeVar("_Runs", int, Ints)
 
 @dataclass(frozen=True, slots=True)
 class Shard:
-    """One shard of `count`; shards of equal count are disjoint and together contain every run.
+    """One shard of `count`. Shards of equal count are disjoint and together contain every run.
 
     Sizes differ by at most one run, in total and in each cell. The shard of a run does not depend on the number of
     runs, so that a campaign can be extended.
@@ -65,7 +65,7 @@ WHOLE = Shard()
 
 
 def owner(run: _Runs, cell: int, num_cells: int, count: int) -> _Runs:
-    """Return the number of the shard that has a run of the cell at that place; elementwise for arrays.
+    """Return the number of the shard that has a run of the cell at that place, elementwise for arrays.
 
     Runs are dealt in turn, all cells of a run number together. When the turn would return to the same cell before every
     cell had it, the next round starts one shard later.

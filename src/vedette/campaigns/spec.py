@@ -112,7 +112,7 @@ class CampaignSpec(Section):
             yield ("compare",), f"one of {', '.join(map(shown_key, comparable))}{why}", describe(self.compare)
 
     def axes(self) -> dict[str, tuple[Any, ...]]:
-        """Return every axis and its values, in the order in which cells are made; scenario and planner are always
+        """Return every axis and its values, in the order in which cells are made. Scenario and planner are always
         present.
         """
         axes: dict[str, tuple[Any, ...]] = {"scenario": self.scenarios, "planner": self.planners}
@@ -130,10 +130,10 @@ class CampaignSpec(Section):
 
 
 def parse_spec(text: str, file: str = "<text>") -> CampaignSpec:
-    """Read a specification from TOML text; messages call it `file`.
+    """Read a specification from TOML text. Messages call it `file`.
 
     Raises:
-        InputError: the text is not TOML, or fields are invalid; the message lists them, one per line.
+        InputError: the text is not TOML, or fields are invalid. The message lists them, one per line.
     """
     try:
         data = tomllib.loads(text)

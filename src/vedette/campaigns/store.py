@@ -29,7 +29,7 @@ from vedette.evaluation.metrics import has_metrics
 
 
 class Store(Writer):
-    """The only writer of a results folder; a context manager. Calls may come from any thread, one at a time."""
+    """The only writer of a results folder, a context manager. Calls may come from any thread, one at a time."""
 
     def __init__(self, folder: Path, campaign: Campaign, fresh: dict[str, Any]) -> None:
         super().__init__(folder)
@@ -46,7 +46,7 @@ class Store(Writer):
     def open(cls, folder: Path | str, campaign: Campaign) -> Store:
         """Create the folder, or continue with it.
 
-        A campaign may continue with a larger number of runs; a smaller number does not reduce it.
+        A campaign may continue with a larger number of runs. A smaller number does not reduce it.
 
         Raises `InputError`, and changes nothing, for a folder that holds something else or another campaign, a folder
         that another process is writing, a damaged file in it, and a place that cannot be written.
@@ -102,7 +102,7 @@ class Store(Writer):
         self.put_failure(Failure(cell, int(run), self.session, message))
 
     def _begin_session(self, fresh: dict[str, Any]) -> dict[str, Any]:
-        """Add a session to the folder's manifest, and open its runs; return the manifest."""
+        """Add a session to the folder's manifest, open its runs, and return the manifest."""
         started = (self.folder / MANIFEST).exists()
         manifest = read_manifest(self.folder) if started else fresh
         check_same_campaign(self.folder, manifest, fresh)

@@ -2,7 +2,7 @@
 
 Every table of many runs begins with the columns `cell`, one for each axis of the campaign, and `run`. Rows are ordered
 by cell as in the campaign, then by run, then by time. The unit of a column is the end of its name (`_m`, `_s`, `_rad`)
-and in the metadata of its field; null means that a metric has no value. A `step` is the number of a scan, from 1; for a
+and in the metadata of its field. Null means that a metric has no value. A `step` is the number of a scan, from 1. For a
 decision it is the scan that it followed.
 """
 
@@ -41,7 +41,7 @@ class FinishedRun:
         record: the record, including timings.
         metrics: metrics of its estimates.
         session: number, from 1, of the session in the manifest's list that stored it.
-        checksum: SHA-256 of everything except timings; equal for equal results.
+        checksum: SHA-256 of everything except timings, equal for equal results.
     """
 
     cell: str
@@ -143,5 +143,5 @@ def _arrow(columns: Columns, layout: Layout) -> pa.Table:
 
 
 def unit_of(column: str) -> str | None:
-    """Return the unit of a column by the end of its name; None for dimensionless columns."""
+    """Return the unit of a column by the end of its name, or None for dimensionless columns."""
     return next((unit for end, unit in _UNITS.items() if column.endswith(end)), None)

@@ -31,7 +31,7 @@ class Task:
 
     Attributes:
         cell, seed, runs: what to run.
-        versions: versions of the packages that determine the bytes of a result; a worker with other versions refuses.
+        versions: versions of the packages that determine the bytes of a result. A worker with other versions refuses.
     """
 
     cell: Cell
@@ -121,7 +121,7 @@ class TaskQueue:
 
     Runs with equal numbers come together, so that strategies can be compared early. The first run of each set of
     kernels comes before the others that need it, so that kernels are compiled once and not once per worker. The
-    duration of a cell's runs is estimated by the fastest finished run; the grouping into tasks does not change results.
+    duration of a cell's runs is estimated by the fastest finished run. The grouping into tasks does not change results.
     """
 
     def __init__(self, campaign: Campaign, finished: Collection[tuple[str, int]]) -> None:
@@ -146,7 +146,7 @@ class TaskQueue:
         return self._num_left
 
     def note_outcome(self, task: Task, outcome: TaskOutcome) -> TaskOutcome:
-        """Record that a task has ended and how long its runs took; return its outcome."""
+        """Record that a task has ended and how long its runs took, and return its outcome."""
         kernels = self._kernels[task.cell.name]
         self._compiled[kernels] = True
         for place in self._waiting.pop(kernels, ()):
@@ -157,7 +157,7 @@ class TaskQueue:
         return outcome
 
     def take(self, room: int = 1) -> Task | None:
-        """Return the next task; None if all runs are handed out, or wait for another run to compile their kernels.
+        """Return the next task. None if all runs are handed out, or wait for another run to compile their kernels.
 
         Args:
             room: number of tasks that may be in progress. With more room each task is longer, so that handing out keeps

@@ -114,7 +114,7 @@ def _check_output(out: Path | None, overwrite: bool) -> None:
 def _calibrate(
     recorded: RecordingScenario, window: float, position: bool, biases: bool | None, prior_scale: float
 ) -> list[CalibrationWindow]:
-    """Return the calibrations of the parts of a recording; biases: None for those of two sensors or more that scan."""
+    """Return the calibrations of the parts of a recording. biases: None for those of two sensors or more that scan."""
     from vedette.calibration.bias_drift import calibrate_windows
     from vedette.scenarios.calibration import build_problem
 
@@ -137,7 +137,7 @@ def _has_several_sensors(recorded: RecordingScenario) -> bool:
 def calibrate_doubtful(recorded: RecordingScenario, fit: Fit, sensors: Path) -> tuple[str, dict[str, Any]] | None:
     """Estimate and print parameters that the sensors file does not give, or that the fit finds wrong.
 
-    Returns the sensors file with the better values, and the calibration as data; None if there is nothing to estimate.
+    Returns the sensors file with better values, and the calibration as data, or None if there is nothing to estimate.
     """
     from vedette.calibration import CalibrationWindow, calibrate
     from vedette.evaluation.doubtful_parameters import doubtful_parameters

@@ -136,7 +136,7 @@ def _mark(each: ParameterEstimate) -> str:
 
 
 def _is_outside(each: ParameterEstimate) -> bool:
-    """Return True if the interval excludes the assumed value; False without an interval."""
+    """Return True if the interval excludes the assumed value, False without an interval."""
     return each.parameter.start < each.ci_low or each.parameter.start > each.ci_high
 
 

@@ -117,7 +117,7 @@ def _read_campaign(spec: Path, runs: int | None, shard: str | None, trust: bool)
 
 
 def _print_outcome(campaign: Campaign, outcome: CampaignOutcome, folder: Path, *, shards: Path | None) -> None:
-    """Print the number of finished runs and the next command; shards: the folder of all shards, None: no shard."""
+    """Print the number of finished runs and the next command. shards: the folder of all shards, None: no shard."""
     finished = outcome.num_completed + outcome.num_existing
     echo(f"{folder}: {finished} of {campaign.total} runs")
     if shards is None:
@@ -156,7 +156,7 @@ def load_workers(workers: int) -> None:
 def run_with_progress(
     campaign: Campaign, folder: Path, workers: int, scheduler: str | None = None, redo_damaged: bool = False
 ) -> CampaignOutcome:
-    """Run a campaign and show its progress; after Ctrl-C, print how to continue."""
+    """Run a campaign and show its progress. After Ctrl-C, print how to continue."""
     from vedette.campaigns import Progress, run_campaign
 
     with interruptible(f"{folder} keeps every run that is finished; the same command goes on from there"):

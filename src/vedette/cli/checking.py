@@ -25,7 +25,7 @@ def check(
     """Check scenario files and sensors files.
 
     Prints every fault with its file, line, column and field, with what was expected and what was found. A sensors file
-    has `sensors`, but neither `time` nor `targets`; `vedette track` uses it. Python code that a scenario names is
+    has `sensors`, but neither `time` nor `targets`. `vedette track` uses it. Python code that a scenario names is
     imported and run for three scans, unless other users can modify it. Warnings, of what is valid but may cost
     accuracy, go to standard error and leave the exit status at 0.
     """
@@ -73,7 +73,7 @@ def _check_sensors(file: Path) -> dict[str, Any]:
 
 
 def code_faults(scenario: Scenario) -> list[str]:
-    """Return the faults of the code that a scenario names; print a warning if other users may have written it."""
+    """Return the faults of the code that a scenario names. Print a warning if other users may have written it."""
     from vedette.scenarios.trust import custom_code, foreign_code_reason
 
     code = custom_code(scenario.model)

@@ -31,11 +31,11 @@ _MAX_DECISIONS = 6  # number of decision times printed; the tables and the repor
 
 
 def print_comparison(comparison: Comparison, words: Sequence[str] = ()) -> None:
-    """Print the table of the strategies and its legend; with `--verbose` also its tails and the decisions.
+    """Print the table of the strategies and its legend, and with `--verbose` also its tails and the decisions.
 
     Args:
         comparison: comparison of the strategies.
-        words: description of each strategy; empty if the strategies are not planners.
+        words: description of each strategy, empty if the strategies are not planners.
     """
     from vedette.evaluation import strategy_rows
     from vedette.evaluation.tables import heading, legend, significance
@@ -80,7 +80,7 @@ def print_scores(scores: Sequence[StrategyScore], comparison: Comparison) -> Non
 
 
 def print_standings(table: SceneTable) -> None:
-    """Print the ranking of entrants on a scene with the columns that fit a terminal; the page has all of them."""
+    """Print the ranking of entrants on a scene with the columns that fit a terminal. The page has all of them."""
     from vedette.campaigns.leaderboard import header, row
     from vedette.evaluation.tail_summary import tail_header, tail_text
 

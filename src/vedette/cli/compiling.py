@@ -1,4 +1,4 @@
-"""Progress of the compilation of kernels: a moving line on a terminal; elsewhere a line at the start and the end."""
+"""Progress of compiling kernels: a moving line on a terminal, and elsewhere a line at the start and the end."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 @contextmanager
 def compiling() -> Iterator[None]:
-    """Show the progress of compilation inside the context; show nothing if all kernels are compiled."""
+    """Show the progress of compilation inside the context. Show nothing if all kernels are compiled."""
     from vedette.kernels.base.compile_progress import watched
 
     progress = _CompileProgress()
@@ -36,7 +36,7 @@ class _CompileProgress:
         self._now: CompileProgress | None = None
 
     def __call__(self, state: CompileProgress | None) -> None:
-        """Update the display; see `vedette.kernels.base.compile_progress.watched`."""
+        """Update the display, see `vedette.kernels.base.compile_progress.watched`."""
         if self._started is None:
             self._begin()
         if state is None:

@@ -53,7 +53,7 @@ def one_of(*names: str) -> Completion:
 
 
 def _first_argument(context: typer.Context) -> str | None:
-    """Return the first argument on the command line, which may be incomplete and not parsed yet; None without one."""
+    """Return the first argument on the command line, perhaps incomplete and not parsed yet, or None without one."""
     return next((each for each in context.args if not each.startswith("-")), None)
 
 

@@ -39,7 +39,7 @@ _FORMER_OPTIONS: dict[tuple[str | None, str], str] = {
 
 
 class CommandGroup(TyperGroup):
-    """Group of all commands; it prints the library's own errors instead of raising them."""
+    """Group of all commands. It prints the library's own errors instead of raising them."""
 
     def main(self, *args: Any, **options: Any) -> Any:
         """Run the program, with an output that can print every character."""
@@ -58,7 +58,7 @@ class CommandGroup(TyperGroup):
                 formatter.write_dl(rows)
 
     def invoke(self, ctx: Any) -> Any:
-        """Run a command; print an exception as a line and convert it into an exit status."""
+        """Run a command. Print an exception as a line and convert it into an exit status."""
         try:
             result = super().invoke(ctx)
             sys.stdout.flush()  # here, where a fault can still be reported as a message
@@ -87,7 +87,7 @@ class CommandGroup(TyperGroup):
 
 
 def _message_with_value(error: typer.BadParameter) -> str:
-    """Return the message of an error; the given value is added to a message of pydantic, which lacks it."""
+    """Return the message of an error. The given value is added to a message of pydantic, which lacks it."""
     pydantic_errors = getattr(error.__cause__, "errors", None)
     if pydantic_errors is None:
         return error.message
@@ -101,7 +101,7 @@ def usage_error(message: str, option: str) -> typer.BadParameter:
 
 
 def check_ending(path: Path | None, option: str, *endings: str) -> None:
-    """Raise a usage error unless the output file, if any, has one of the endings; this protects other files."""
+    """Raise a usage error unless the output file, if any, has one of the endings. This protects other files."""
     if path is not None and path.suffix[1:].lower() not in endings:
         raise usage_error(f"expected a file ending in {', '.join(endings)}; got {path}", option)
 

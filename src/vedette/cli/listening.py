@@ -25,7 +25,7 @@ class Source(NamedTuple):
 
 
 def parse_sources(addresses: Sequence[str], token: str | None) -> list[Source]:
-    """Return the sources of lines; raise if an address needs a token or a package that is missing."""
+    """Return the sources of lines. Raise if an address needs a token or a package that is missing."""
     from vedette.live.server import check_address
 
     sources = [_parse_source(address) for address in addresses]
@@ -60,7 +60,7 @@ def print_answers(answers: Iterable[dict[str, Any]]) -> None:
 async def listen_to(
     persistent: PersistentLoop, screen: LiveScreen | None, sources: Sequence[Source], token: str | None
 ) -> None:
-    """Process lines until standard input ends, or until Ctrl-C if there are clients; do not wait for them."""
+    """Process lines until standard input ends, or until Ctrl-C if there are clients. Do not wait for them."""
     import asyncio
 
     from vedette.live import LineServer, iter_lines

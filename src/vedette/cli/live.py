@@ -116,7 +116,7 @@ def live(
 ) -> None:
     """Track scans as they arrive.
 
-    Reads one JSON line per scan; writes estimates, and plans when a decision is due.
+    Reads one JSON line per scan, and writes estimates, and plans when a decision is due.
     """
     from vedette.live import PersistentLoop
 
@@ -140,7 +140,7 @@ def live(
 
 
 class _LoopOptions(NamedTuple):
-    """Options that change the answers; a snapshot or record made with others is refused."""
+    """Options that change the answers. A snapshot or record made with others is refused."""
 
     max_delay: float
     max_lead: float

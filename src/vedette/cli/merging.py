@@ -70,7 +70,7 @@ def _print_missing(merged: MergeResult, commands: list[str]) -> None:
 
 
 def _commands(merged: MergeResult) -> list[str]:
-    """Return the command for each missing shard; a single command if the campaign was not divided."""
+    """Return the command for each missing shard, or a single command if the campaign was not divided."""
     words = ["vedette", "campaign", "SPEC", f"--runs={merged.results.campaign.num_runs}", "--out"]
     if merged.count == 1:
         return [shlex.join([*words, str(merged.results.folder)]) for _ in merged.missing]

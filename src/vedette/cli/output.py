@@ -1,4 +1,4 @@
-"""Output of commands to a terminal, file or pipe; it handles closed pipes and full disks.
+"""Output of commands to a terminal, file or pipe. It handles closed pipes and full disks.
 
 Every command takes `--json`, `--quiet` and `--verbose` (`with_output_options`). All output goes through here: results
 by `echo` and `console`, remarks by `note`, the document of `--json` by `emit_json`. Errors are always printed.
@@ -111,7 +111,7 @@ def wrap_line(text: str, width: int) -> str:
 
 
 def emit_json(document: Mapping[str, Any] | list[dict[str, Any]]) -> None:
-    """Print the result of a command as data, if `--json` is given; called once. A mapping gets the format's version."""
+    """Print the result of a command as data, if `--json` is given. Called once. A mapping gets the format's version."""
     print_json({"version": FORMAT_VERSION, **document} if isinstance(document, Mapping) else document)
 
 
@@ -144,7 +144,7 @@ def console(*, stderr: bool = False) -> Console:
 
 @contextmanager
 def bar(what: str, total: int | None = None) -> Iterator[Callable[..., None]]:
-    """Show a progress bar on a terminal; yields a function that receives the amount done, and the total if unknown."""
+    """Show a progress bar on a terminal. Yields a function that receives the amount done, and the total if unknown."""
     from rich.progress import Progress
 
     screen = console(stderr=True)
@@ -154,7 +154,7 @@ def bar(what: str, total: int | None = None) -> Iterator[Callable[..., None]]:
 
 
 def print_names(rows: Mapping[str, str]) -> None:
-    """Print names with their descriptions; on a narrow terminal, each name has its own line."""
+    """Print names with their descriptions. On a narrow terminal, each name has its own line."""
     from rich.cells import cell_len
     from rich.padding import Padding
     from rich.table import Table
@@ -185,7 +185,7 @@ def replace_unencodable() -> None:
 
 
 def system_error_message(error: OSError) -> str:
-    """Return the message for a system error that no command has explained; empty if the reader of a pipe has gone.
+    """Return the message for a system error that no command has explained, empty if the reader of a pipe has gone.
 
     Raises the error again if it does not concern the output, a limit of the system or a file.
     """

@@ -20,7 +20,7 @@ _SHOWN_ROWS = 5
 def read_recording(
     sensors: Path, scans: Path, truth: Path | None, *, speed: float, bad_rows: str, trust: bool
 ) -> tuple[RecordingScenario, list[str]]:
-    """Return the scenario of recorded scans and its warnings; print skipped rows, assumptions and code that runs."""
+    """Return the scenario of recorded scans and its warnings. Print skipped rows, assumptions and code that runs."""
     from vedette.scenarios.from_recording import scenario_from_recording
 
     if bad_rows not in BAD_ROWS:

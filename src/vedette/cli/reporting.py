@@ -66,7 +66,7 @@ WrittenReport = tuple[Sequence[Path], Sequence[str]]
 def _report_campaign(
     folder: Path, page: Path, figures: Path | None, replays: list[tuple[str, int]] | None, trust: bool
 ) -> WrittenReport:
-    """Write the report and figures; return the figures that were written, and the code that was not run."""
+    """Write the report and figures, and return the figures that were written, and the code that was not run."""
     from vedette.campaigns.results import open_results
     from vedette.reports import replay_code, write_figures, write_report
 
@@ -112,7 +112,7 @@ def _figures(folder: Path | None, write: Callable[[Path], Sequence[Path]]) -> Se
 
 
 def saved_run(folder: Path) -> tuple[RunRecord, Scenario]:
-    """Return a saved run and its scenario; raise `VedetteError` for a folder without both."""
+    """Return a saved run and its scenario. Raise `VedetteError` for a folder without both."""
     from vedette.scenarios import load_scenario
     from vedette.simulation.storage import SCENARIO, load_run
 

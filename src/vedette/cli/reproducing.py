@@ -101,7 +101,7 @@ def reproduce(
 def comparison_spec(
     scenario: str, planners: str | None, runs: int | None, seed: int, name: str = _FOLDER
 ) -> CampaignSpec:
-    """Return the campaign of strategies on one scenario from the command line; raise `VedetteError` without one."""
+    """Return the campaign of strategies on one scenario from the command line. Raise `VedetteError` without one."""
     from vedette.campaigns import CampaignSpec
     from vedette.campaigns.published import published_comparisons
     from vedette.scenarios import list_builtin, load_scenario
@@ -141,7 +141,7 @@ def _print_list() -> None:
 def _print_outcome(
     opened: CampaignResults, groups: Sequence[GroupComparison], published: PublishedComparison | None
 ) -> dict[str, Any]:
-    """Print the results, and what is published of them; return the published part of the document."""
+    """Print the results, and what is published of them, and return the published part of the document."""
     if published is None:
         print_results(opened, groups)
         return {"published": [], "claims": []}

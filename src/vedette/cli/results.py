@@ -46,7 +46,7 @@ TexFile = Annotated[
 
 
 def results(folder: ResultsFolder, export: Export = None, formats: Formats = None, tex: TexFile = None) -> None:
-    """Print the comparison of a campaign's strategies, and what is still to be run, or a single run; export either."""
+    """Print the comparison of a campaign's strategies and what is still to be run, or a single run. Export either."""
     _check_options(export, formats or (), tex)
     from vedette.simulation.storage import holds_run
 
@@ -74,7 +74,7 @@ def _check_options(export: Path | None, formats: Sequence[str], tex: Path | None
 
 
 def _show_run(folder: Path, tex: Path | None) -> tuple[RunRecord, dict[str, Any], list[Path]]:
-    """Print a saved run; return it, its document, and no files."""
+    """Print a saved run, and return it, its document, and no files."""
     from vedette.evaluation.fit import Fit
     from vedette.simulation.storage import load_run, read_manifest
 
@@ -87,7 +87,7 @@ def _show_run(folder: Path, tex: Path | None) -> tuple[RunRecord, dict[str, Any]
 
 
 def _show_campaign(folder: Path, tex: Path | None) -> tuple[CampaignResults, dict[str, Any], list[Path]]:
-    """Print the results of a campaign; return them, their document, and the file of LaTeX tables if one is written."""
+    """Print the results of a campaign. Return them, their document, and the file of LaTeX tables if one is written."""
     from vedette.campaigns.results import open_results
 
     opened = open_results(folder, num_workers=0)
@@ -115,7 +115,7 @@ def _write_tex(opened: CampaignResults, groups: Sequence[GroupComparison], path:
 
 
 def _load_scenario(folder: Path) -> Scenario | None:
-    """Return the scenario of a saved run; print a note and return None if it is missing or cannot be read."""
+    """Return the scenario of a saved run. Print a note and return None if it is missing or cannot be read."""
     from vedette.scenarios import load_scenario
     from vedette.simulation.storage import SCENARIO
 

@@ -24,7 +24,7 @@ _LONGEST_ACTIONS = 36  # letters; longer actions are printed only with --verbose
 
 
 def print_run(record: RunRecord, scenario: Scenario | None, fit: Fit | None = None, num_warnings: int = 0) -> None:
-    """Print the summary of a run; with `--verbose` all decisions and diagnostics.
+    """Print the summary of a run, and with `--verbose` all decisions and diagnostics.
 
     Without the scenario, OSPA has no unit and sensors have numbers. fit: of the model to recorded scans. num_warnings:
     shown before.
@@ -42,7 +42,7 @@ def print_run(record: RunRecord, scenario: Scenario | None, fit: Fit | None = No
 
 
 def _title(record: RunRecord, scenario: Scenario | None) -> str:
-    """Return the title: scenario, planner, seed, run and number of scans; for a recording only scenario and scans."""
+    """Return the title: scenario, planner, seed, run and number of scans (for a recording only scenario and scans)."""
     from vedette.scenarios.sections.planners import describe_strategy
 
     scans = pluralise(record.num_scans, "scan")
@@ -121,7 +121,7 @@ def _far_words(record: RunRecord, scenario: Scenario, counts: Bools, total: floa
 
 
 def _print_diagnostics(console: Console, record: RunRecord, scenario: Scenario | None) -> None:
-    """Print the diagnostics that may reduce accuracy; with `--verbose` also notes."""
+    """Print the diagnostics that may reduce accuracy, and with `--verbose` also notes."""
     from vedette.evaluation.diagnostics import diagnostics_line, record_diagnostics
 
     diagnostics = record_diagnostics(record, scenario)

@@ -50,7 +50,7 @@ def interruptible(advice: str) -> Iterator[None]:
 
 
 def check_out(out: Path | None, overwrite: bool) -> tuple[int, ...]:
-    """Check the folder of `--out`, if it is given; return the identity of the run in it."""
+    """Check the folder of `--out`, if it is given, and return the identity of the run in it."""
     from vedette.simulation.storage import check_target
 
     with option_errors({"directory": "--out"}):
@@ -79,7 +79,7 @@ def save_unfinished(record: RunRecord, scenario: Scenario, fit: Fit | None, fold
 
 @contextmanager
 def finishing(folder: Path, what: str) -> Iterator[None]:
-    """Remove the mark of an unfinished folder after the last of its files; Ctrl-C leaves it."""
+    """Remove the mark of an unfinished folder after the last of its files. Ctrl-C leaves it."""
     from vedette.simulation.storage import UNFINISHED
 
     with interruptible(f"wrote {folder}, but not all of its {what}; the same command starts anew"):
@@ -187,7 +187,7 @@ def run(
 def _simulate(
     scenario: Scenario, planner: str, seed: int, run_number: int, threads: int
 ) -> tuple[RunRecord, RunStopped | RunInterrupted | None]:
-    """Return the record of a run, and why it stopped early if it did; exit if it stopped before the first scan."""
+    """Return the record of a run, and why it stopped early if it did. Exit if it stopped before the first scan."""
     from vedette.evaluation.runs import run_scenario
     from vedette.simulation.journal import RunInterrupted, RunStopped
 

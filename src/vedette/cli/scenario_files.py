@@ -152,7 +152,7 @@ def _write_generated(path: Path | None, name: str, text: str, overwrite: bool) -
 
 
 def _write_start(files: dict[Path, str], target: Path, overwrite: bool) -> None:
-    """Write the files, and the schema next to `target`; raise `InputError` if one already exists."""
+    """Write the files, and the schema next to `target`. Raise `InputError` if one already exists."""
     existing = [str(file) for file in files if file.exists()]
     if existing and not overwrite:
         raise InputError(f"{', '.join(existing)}: already there; --overwrite replaces it")
@@ -226,7 +226,7 @@ def _schema_text() -> str:
 
 
 def write_text(path: Path, text: str) -> None:
-    """Write a file completely or not at all, and make its folder; raise `InputError` if this is not possible."""
+    """Write a file completely or not at all, and make its folder. Raise `InputError` if this is not possible."""
     from vedette.internal.files import write_file
 
     write_file(path, lambda file: file.write(text.encode("utf-8")), make_folder=True)

@@ -117,7 +117,7 @@ def _sensors(scenario: Scenario) -> Table:
 
 
 def _with_rows(table: Table, rows: Sequence[tuple[str | Text, ...]]) -> Table:
-    """Return the table with its rows; of a long table the first rows, without `--verbose`."""
+    """Return the table with its rows, of a long table the first rows, without `--verbose`."""
     show_all = is_verbose() or len(rows) <= _MAX_ROWS
     for row in rows if show_all else rows[:_FIRST_ROWS]:
         table.add_row(*row)
@@ -156,7 +156,7 @@ def _targets(scenario: Scenario) -> Table:
 
 
 def sample_truth(scenario: Scenario) -> Truth:
-    """Return the true targets of one run; with process noise they differ from run to run."""
+    """Return the true targets of one run. With process noise they differ from run to run."""
     import numpy as np
 
     from vedette.scenarios.build import build_targets

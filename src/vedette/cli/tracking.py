@@ -161,7 +161,7 @@ def _check_output(formats: Sequence[str], out: Path | None, overwrite: bool) -> 
 
 
 def _run_tracker(scenario: Scenario, recording: RecordedScans) -> RunRecord:
-    """Run the tracker over all scans; exit if the run stops early."""
+    """Run the tracker over all scans. Exit if the run stops early."""
     from vedette.evaluation.runs import track_recording
     from vedette.simulation.journal import RunInterrupted, RunStopped
 
@@ -175,7 +175,7 @@ def _run_tracker(scenario: Scenario, recording: RecordedScans) -> RunRecord:
 def _write_tracks(
     record: RunRecord, scenario: Scenario, folder: Path, formats: Sequence[str] | None, joins: Sequence[Join]
 ) -> list[Path]:
-    """Write the tracks in each format; return their files."""
+    """Write the tracks in each format, and return their files."""
     from vedette.evaluation.track_table import table_of_run, write_tracks
 
     default_formats = ("csv", "geojson") if scenario.model.origin is not None else ("csv",)
@@ -195,7 +195,7 @@ def _contents(out: Path, written: list[Path]) -> list[str]:
 
 
 def _print_tracks(record: RunRecord, recorded: RecordingScenario, scans: Path, join: bool) -> tuple[Join, ...]:
-    """Print the size of the recording and the number of tracks; return the joins of tracks, none without `join`."""
+    """Print the size of the recording and the number of tracks, and return the joins of tracks, none without `join`."""
     from vedette.evaluation.joining import joins_of_run, with_joined_tracks
 
     scenario, recording, _ = recorded

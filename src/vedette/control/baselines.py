@@ -69,7 +69,7 @@ class RandomPlanner:
             )
 
     def plan(self, state: State, poses: Floats, *, rng: np.random.Generator) -> Plan:
-        """Return a plan drawn from `rng`; beliefs are used only by constraints."""
+        """Return a plan drawn from `rng`. Beliefs are used only by constraints."""
         generator(rng)
         options = options_of(self.sensors, poses, self.settings)
         if self.constraints:
@@ -141,7 +141,7 @@ class ConstraintReportingPlanner:
         return replace(self, planner=planner.with_truth(truth)) if isinstance(planner, RequiresTruth) else self
 
     def plan(self, state: State, poses: Floats, *, rng: np.random.Generator) -> Plan:
-        """Return the planner's decision; raises its errors, and `InputError` as `feasible_action_mask`."""
+        """Return the planner's decision. Raises its errors, and `InputError` as `feasible_action_mask`."""
         plan, settings = self.planner.plan(state, poses, rng=rng), self.settings
         at, times = check_poses(poses, len(self.sensors)), settings.horizon_times()
         rows = zip(self.sensors, at, plan.chosen_actions, strict=True)

@@ -12,7 +12,7 @@ from vedette.kernels.planning.joint_values import existence_logits, label_values
 
 
 class Contributions(NamedTuple):
-    """Contributions to a reward, in its own unit; means over the samples.
+    """Contributions to a reward, in its own unit, as means over the samples.
 
     `baseline` plus the sum of `sensors` equals the reward, and so does `baseline` plus `existence`, `localisation` and
     `found` less the price of the sensors' courses.
@@ -28,7 +28,7 @@ class Contributions(NamedTuple):
 
 
 def contributions_of(additive: AdditiveRewards, chosen: Ints, sensors: Ints) -> Contributions:
-    """Return the contributions of some sensors to the reward of courses (num_sensors,); the others always scan.
+    """Return the contributions of some sensors to the reward of courses (num_sensors,). The others always scan.
 
     A sensor's contribution is its Shapley value on two orders, the printed and the reverse one: rewards of the first
     sensors, of the last ones, and of all but one, while the rest of them do not scan. sensors: (num,) indices of
@@ -51,10 +51,10 @@ def contributions_of(additive: AdditiveRewards, chosen: Ints, sensors: Ints) -> 
 
 
 def _of_labels(additive: AdditiveRewards, chosen: Ints, rest: Ints) -> tuple[Floats, Floats] | tuple[None, None]:
-    """Return (num_labels,) gains by existence, and by localisation; None if the reward is not linear in its sums.
+    """Return (num_labels,) gains by existence, and by localisation, or None if the reward is not linear in its sums.
 
     The gain by existence is that of the existence after all scans with the density after the scans of `rest`, in which
-    -1 is a sensor that does not scan; the remainder is localisation.
+    -1 is a sensor that does not scan. The remainder is localisation.
     """
     valuation, coefficients, without_scans = additive.valuation, additive.coefficients, additive.with_scans(rest)
     if coefficients is None:

@@ -31,7 +31,7 @@ class DecisionAnalysis:
 
     Attributes:
         planner: name of the planner.
-        parts: the decisions made as units; the reward is the sum of theirs.
+        parts: the decisions made as units. The reward is the sum of theirs.
         bound: of the plan.
     """
 
@@ -84,7 +84,7 @@ class DecisionAnalysis:
 
     @cached_property
     def _contributions(self) -> tuple[Contributions | None, ...]:
-        """Contributions of each part; None if its rewards are evaluated case by case."""
+        """Contributions of each part, or None if its rewards are evaluated case by case."""
         return tuple(part.shares() for part in self.parts)
 
     @cached_property
@@ -96,7 +96,7 @@ class DecisionAnalysis:
         )
 
     def _shares(self, missing: dict[str, str]) -> dict[str, Any]:
-        """Return the fields of an `Explanation` with contributions; reasons for None are put in `missing`."""
+        """Return the fields of an `Explanation` with contributions. Reasons for None are put in `missing`."""
         names = ("baseline", "of_targets", "of_undetected", "of_sensors", "reward_without_sensor")
         contributions: dict[str, Any] = dict.fromkeys(names)
         each = [shares for shares in self._contributions if shares is not None]
@@ -126,7 +126,7 @@ class DecisionAnalysis:
         return TargetGains(prediction.tracks.labels.copy(), np.sum(existence, axis=0), np.sum(localisation, axis=0))
 
     def _runner_up(self) -> RunnerUp | None:
-        """Return the best other joint action; for an independent decision, one sensor's own second best."""
+        """Return the best other joint action, or for an independent decision, one sensor's own second best."""
         candidates = [
             (part.evidence.mean_of(part.chosen) - best[1], place, best[0])
             for place, part in enumerate(self.parts)
@@ -190,7 +190,7 @@ def _few(own: Actions) -> str:
 
 
 def _error(samples: Floats) -> float | None:
-    """Return the standard error of a mean over samples; None with a single sample."""
+    """Return the standard error of a mean over samples, or None with a single sample."""
     num = len(samples)
     return float(samples.std(ddof=1) / math.sqrt(num)) if num > 1 else None
 

@@ -64,7 +64,7 @@ class Rounds:
         num_samples: number of samples drawn so far.
         rng: generator of the samples.
         deadline: of searches and rounds.
-        others: (num_sensors,) courses that sensors which decide alone assume for the others; None: no other sensors.
+        others: (num_sensors,) courses that sensors which decide alone assume for the others. None: no other sensors.
     """
 
     preparation: Preparation
@@ -88,7 +88,7 @@ class Rounds:
         return cls(preparation, preparation.evaluator(num_samples, rng=rng), num_samples, rng, deadline, others)
 
     def _run(self, races: Sequence[Race]) -> Literal["max_samples", "max_seconds"] | None:
-        """Run rounds, at least one, until all races are over; return the reason if they were stopped before."""
+        """Run rounds, at least one, until all races are over, and return the reason if they were stopped before."""
         settings = self.preparation.settings
         max_samples = settings.max_samples - self.num_samples + races[0].num_samples
         while open_races := [race for race in races if race.verdict is None or race.num_samples == 0]:
@@ -130,7 +130,7 @@ class Rounds:
         return rewards
 
     def certainty(self, races: Sequence[Race]) -> SamplingOutcome:
-        """Run all races and return how they ended; their error probabilities add up."""
+        """Run all races and return how they ended. Their error probabilities add up."""
         stopped = self._run(races)
         over: Literal["one left", "indifferent"] = "indifferent"
         if all(race.verdict == "one left" for race in races):
@@ -143,10 +143,10 @@ class Rounds:
 def decide_jointly(
     name: str, preparation: Preparation, search: JointSearch, notes: Sequence[str], *, rng: np.random.Generator
 ) -> Plan:
-    """Return the plan with the joint action that a search finds; with a confidence, the winner of races.
+    """Return the plan with the joint action that a search finds, or with a confidence, the winner of races.
 
     If the search evaluates all joint actions, all of them race from the first sample on. Otherwise its best ones race
-    on fresh samples, because they were selected for high rewards on the samples of the search; so do those that a mask
+    on fresh samples, because they were selected for high rewards on the samples of the search. So do those that a mask
     allows.
     """
     settings, races, mask = preparation.settings, preparation.races, preparation.mask
@@ -187,7 +187,7 @@ def decide_independently(
     *,
     rng: np.random.Generator,
 ) -> Plan:
-    """Return the plan with the best feasible course of each sensor; the confidence is that all of them are best.
+    """Return the plan with the best feasible course of each sensor. The confidence is that all of them are best.
 
     others_assumption: what each sensor assumes about the others.
     """
@@ -263,7 +263,7 @@ def combine_parts(
 
 
 def _courses_in_races(open_races: Sequence[Race], sensor: int) -> Ints:
-    """Return the courses of a sensor that some candidate takes; one course, if no race needs any."""
+    """Return the courses of a sensor that some candidate takes. One course, if no race needs any."""
     races = [race for race in open_races if race.sensor in (None, sensor)]
     columns = [race.candidates[:, sensor if race.sensor is None else 0] for race in races]
     return np.unique(np.concatenate(columns)) if columns else np.zeros(1, np.int64)

@@ -58,7 +58,7 @@ class Evidence:
         self.shape = tuple([shape[s] for s in self.which])
 
     def evaluate(self, actions: Ints) -> Floats:
-        """Return mean rewards (num,) of joint actions (num, num_sensors); -inf if one is not finite.
+        """Return mean rewards (num,) of joint actions (num, num_sensors), or -inf if one is not finite.
 
         Raises `InputError` for invalid joint actions.
         """
@@ -78,7 +78,7 @@ class Evidence:
         return np.asarray(np.concatenate(means))
 
     def samples(self) -> Floats | None:
-        """Return kept rewards (num_joint, num_samples) in printed order; None unless each was evaluated once."""
+        """Return kept rewards (num_joint, num_samples) in printed order, or None unless each was evaluated once."""
         num = sum(len(actions) for actions, _ in self._samples)
         if num != math.prod(self.shape) or not self.is_complete():
             return None
@@ -139,7 +139,7 @@ class Evidence:
         return self._evaluations[-1] if self._evaluations else 0
 
     def best_other(self, choice: Sequence[int]) -> tuple[tuple[int, ...], float] | None:
-        """Return the best stored joint action other than the choice, and its mean reward; None if there is none.
+        """Return the best stored joint action other than the choice, and its mean reward, or None if there is none.
 
         Of equal ones the first evaluated.
         """
@@ -233,7 +233,7 @@ class Part(NamedTuple):
         return cls(evidence, (course,), own, others)
 
     def shares(self) -> Contributions | None:
-        """Return the contributions to its reward; None if rewards are not sums over labels."""
+        """Return the contributions to its reward, or None if rewards are not sums over labels."""
         if self.additive is None:
             return None
         joint, sensors = np.array(self.chosen), np.arange(len(self.chosen))

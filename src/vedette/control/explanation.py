@@ -24,10 +24,10 @@ class Bound:
     """Upper bound on the reward of the best joint action, on the same samples.
 
     Attributes:
-        upper: no joint action has a larger mean reward; inf if some target has no bound.
+        upper: no joint action has a larger mean reward. It is inf if some target has no bound.
         reward: mean reward of the choice.
-        kind: "exhaustive": every joint action was evaluated; "by target": the sum over targets of the best joint action
-            for each; "relaxed": by a mixture of courses of each sensor.
+        kind: "exhaustive": every joint action was evaluated. "by target": the sum over targets of the best joint action
+            for each. "relaxed": by a mixture of courses of each sensor.
         unbounded: number of targets without a bound, because too many sensors may see them.
     """
 
@@ -43,12 +43,12 @@ class Bound:
 
     @property
     def is_close(self) -> bool:
-        """True if the gap is at most a fifth of the reward; texts and tables leave out looser bounds."""
+        """True if the gap is at most a fifth of the reward. Texts and tables leave out looser bounds."""
         return self.relative <= 0.2
 
     @property
     def relative(self) -> float:
-        """The gap relative to the magnitude of the bound or of the reward, whichever is larger; 0 for no gap."""
+        """The gap relative to the magnitude of the bound or of the reward, whichever is larger, or 0 for no gap."""
         scale = max(abs(self.upper), abs(self.reward))
         return self.gap / scale if self.gap > 0.0 else 0.0
 
@@ -83,7 +83,7 @@ class RunnerUp(NamedTuple):
 
     @property
     def in_standard_errors(self) -> float | None:
-        """The margin in standard errors, inf if it is equal in all samples; None without standard error."""
+        """The margin in standard errors, inf if it is equal in all samples, and None without standard error."""
         return _ratio(self.margin, self.standard_error)
 
 
@@ -98,7 +98,7 @@ class Counterfactual(NamedTuple):
 
     @property
     def in_standard_errors(self) -> float | None:
-        """The difference in standard errors; None without standard error."""
+        """The difference in standard errors, or None without standard error."""
         return _ratio(self.difference, self.standard_error)
 
     def __str__(self) -> str:
@@ -108,19 +108,19 @@ class Counterfactual(NamedTuple):
 
 @dataclass(frozen=True, slots=True, repr=False)
 class Explanation:
-    """Explanation of a plan. Rewards are means over the samples; `missing` gives the reason for a field that is None.
+    """Explanation of a plan. Rewards are means over the samples. `missing` gives the reason for a field that is None.
 
-    `baseline` plus the sum of `of_targets.total` plus `of_undetected` less `price` equals `reward`; so does `baseline`
-    plus the sum of `of_sensors`. The reward of an independent decision is the sum of the rewards that the sensors
-    decided on, with what each of them assumes about the others.
+    `baseline` plus the sum of `of_targets.total` plus `of_undetected` less `price` equals `reward`, and so does
+    `baseline` plus the sum of `of_sensors`. The reward of an independent decision is the sum of the rewards that the
+    sensors decided on, with what each of them assumes about the others.
 
     Attributes:
         planner: name of the planner.
         chosen: the action of each sensor, as text.
         reward: reward of the choice.
-        standard_error: standard error of the reward; None with a single sample.
-        evaluations: number of joint actions evaluated; for an independent decision, of actions.
-        baseline: the reward without any scan; if sensors assume that the others stay, the sum of rewards with these
+        standard_error: standard error of the reward, or None with a single sample.
+        evaluations: number of joint actions evaluated, or for an independent decision, of actions.
+        baseline: the reward without any scan. If sensors assume that the others stay, the sum of rewards with these
             alone.
         of_targets: gains from each target of the fused belief.
         of_undetected: gain from undetected targets.
@@ -129,10 +129,10 @@ class Explanation:
         reward_without_sensor: (num_sensors,) the reward had the sensor not scanned, at no price, given the other
             sensors' choices.
         runner_up: the best other joint action that was evaluated.
-        bound: upper bound on the best reward; None if no bound is available.
+        bound: upper bound on the best reward, or None if no bound is available.
         missing: reasons for fields that are None, by name.
         price: of all chosen actions, which is subtracted from the gain.
-        answer: function behind `counterfactual`; None without the evidence.
+        answer: function behind `counterfactual`, or None without the evidence.
     """
 
     planner: str
@@ -165,7 +165,7 @@ class Explanation:
         Args:
             sensor: its index, from 0.
             action: index of the action, if no columns are given.
-            columns: the numbers of an action, as in `heading_deg=60.0`; omitted ones are as chosen. Angles in degrees
+            columns: the numbers of an action, as in `heading_deg=60.0`. Omitted ones are as chosen. Angles in degrees
                 are compared modulo full turns.
 
         Raises:
@@ -214,7 +214,7 @@ def with_error(value: float, error: float | None, sign: str = "+-") -> str:
 
 
 def number_text(value: float, scale: float) -> str:
-    """Return a number with four digits; 0 if it is rounding error relative to the scale."""
+    """Return a number with four digits, or 0 if it is rounding error relative to the scale."""
     return "0" if abs(value) <= _SAME * abs(scale) else f"{value:.4g}"
 
 

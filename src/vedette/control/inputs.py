@@ -28,14 +28,14 @@ from vedette.tracking import State
 
 
 def check_sensors(sensors: Sequence[MobileSensor]) -> TargetModel:
-    """Return the target model of the sensors; `InputError` unless there is a sensor and all have the same model."""
+    """Return the sensors' target model. Raises `InputError` unless there is a sensor and all have the same model."""
     if len(sensors) == 0 or not all(isinstance(sensor, MobileSensor) for sensor in sensors):
         raise reject("sensors", "at least one MobileSensor", sensors)
     return common_target_model([sensor.filter for sensor in sensors])
 
 
 def check_control_inputs(planner: Any) -> None:
-    """Store sensors and constraints of a planner as tuples; `InputError` if they or the settings are invalid."""
+    """Store sensors and constraints of a planner as tuples. Raises `InputError` if they or the settings are invalid."""
     for name, expected in (("sensors", "at least one MobileSensor"), ("constraints", "constraints in a tuple")):
         object.__setattr__(planner, name, sequence(name, getattr(planner, name), expected))
     check_sensors(planner.sensors)
@@ -54,7 +54,7 @@ def check_reward_inputs(fusion: Any, reward: Any, notes: Any = ()) -> None:
 
 
 def check_poses(poses: Any, num_sensors: int) -> Floats:
-    """Return the poses as an array (num_sensors, 3 or more); `InputError` for other shapes or non-finite values."""
+    """Return the poses, (num_sensors, 3 or more). Raises `InputError` for other shapes or non-finite values."""
     checked = float_array("poses", poses, (num_sensors, None))
     if checked.shape[1] < 3:
         raise reject("poses", f"an array of shape ({num_sensors}, 3 or more)", f"shape {checked.shape}")
@@ -64,7 +64,7 @@ def check_poses(poses: Any, num_sensors: int) -> Floats:
 
 
 def options_of(sensors: Sequence[MobileSensor], poses: Any, settings: PlanningSettings) -> tuple[Options, ...]:
-    """Return the options of each sensor of a planner over the horizon; `InputError` for invalid poses or platforms."""
+    """Return each sensor's options over the planner's horizon. Raises `InputError` for invalid poses or platforms."""
     at, times, options = check_poses(poses, len(sensors)), settings.horizon_times(), []
     for s, sensor in enumerate(sensors):
         options.append(options_at(f"sensors[{s}].platform", sensor.platform, at[s], times, sensor.abilities))
@@ -106,7 +106,7 @@ def _check_density(name: str, density: Any, kind: type[Any], state_dim: int, che
 
 
 def check_choice(name: str, choice: Any, shape: tuple[int, ...]) -> tuple[int, ...]:
-    """Return a joint action as integers; `InputError` unless it has one action per sensor, each within `shape`."""
+    """Return a joint action as integers. Raises `InputError` unless it has one action per sensor within `shape`."""
     array = np.asarray(choice)
     fits = array.shape == (len(shape),) and array.dtype.kind in "iu" and bool(((array >= 0) & (array < shape)).all())
     if not fits:
@@ -126,7 +126,7 @@ def mask_of_decision(
     poses: Floats,
     settings: PlanningSettings,
 ) -> Mask | None:
-    """Return the mask of feasible joint actions; None without constraints. Raises as `feasible_action_mask`.
+    """Return the mask of feasible joint actions, or None without constraints. Raises as `feasible_action_mask`.
 
     state: the present state, from which constraints may predict targets.
     """
@@ -146,7 +146,7 @@ def predicted_beliefs(
     first: int,
     last: int,
 ) -> tuple[LabelledDensity, ...]:
-    """Return the fused belief predicted by `first` to `last` steps of the horizon; empty if no constraint needs it.
+    """Return the fused belief predicted by `first` to `last` steps of the horizon, empty if no constraint needs it.
 
     Raises `InputError` for a belief without labels.
     """
@@ -174,7 +174,7 @@ def stationary_courses(options: Sequence[Options], mask: Mask | None) -> tuple[i
     """Return for each sensor the feasible course that changes its pose least: its assumed course until it decides.
 
     The course with the least change of heading, of these that with the least change of the camera's pointing, then of
-    position, then of all else except the remaining seconds of scanning; means over the horizon. If only some sensors
+    position, then of all else except the remaining seconds of scanning, as means over the horizon. If only some sensors
     may scan, the sensor is off.
     """
     stationary = []
@@ -196,7 +196,7 @@ def stationary_courses(options: Sequence[Options], mask: Mask | None) -> tuple[i
 
 
 def compiled_mask(mask: Mask | None, shape: Sequence[int]) -> Allowed | None:
-    """Return the mask in the form of the compiled ascent; None if it would be too large."""
+    """Return the mask in the form of the compiled ascent, or None if it would be too large."""
     none, num_courses = np.ones((0, 0), np.bool_), sum(shape)
     on, max_active = np.zeros(num_courses, np.bool_), len(shape)
     if mask is None:

@@ -24,9 +24,9 @@ class RewardTable(SummaryRepr):
 
     Attributes:
         sensors: the sensors whose actions index the axes of the table, in axis order.
-        mean: (num_actions of sensors[0], ...) mean reward over the samples; one axis per sensor. NaN if a search did
+        mean: (num_actions of sensors[0], ...) mean reward over the samples, one axis per sensor. NaN if a search did
             not evaluate the action.
-        standard_error: same shape; standard error of that mean, 0 with a single sample; NaN if the mean is NaN.
+        standard_error: same shape, standard error of that mean, 0 with a single sample, and NaN if the mean is NaN.
     """
 
     sensors: tuple[int, ...]
@@ -97,19 +97,19 @@ class Plan(TabularRepr):
         planner: name of the planner.
         actions: for each sensor, its possible actions, in printed order.
         chosen: for each sensor, the index of its chosen action in `actions`.
-        tables: independent decisions: one 1-D table per sensor; joint decisions: one table with one axis per sensor (if
-            that would be too large, one 1-D table per sensor, the others at their chosen actions); random and fixed
+        tables: independent decisions: one 1-D table per sensor. Joint decisions: one table with one axis per sensor (if
+            that would be too large, one 1-D table per sensor, the others at their chosen actions). Random and fixed
             control: none. Means are over the samples that an action got: with `PlanningSettings.confidence` those that
             were excluded early got fewer than the choice, so that the largest mean need not be the choice's.
         counts: numbers of filter steps, fusions and rewards evaluated.
         notes: notes for readers, such as that rewards were evaluated one by one.
-        curve: of a joint decision, the progress of the search; else None.
-        bound: of a joint decision, the upper bound on its reward; None if no bound is available.
+        curve: of a joint decision, the progress of the search, else None.
+        bound: of a joint decision, the upper bound on its reward, or None if no bound is available.
         sequence: of a decision over several periods, for each sensor the rows (num_decisions, num_columns) of all
-            chosen actions, the first of which is to be taken; else empty.
-        certainty: why sampling stopped, if a confidence was required; else None.
-        explanation: the explanation, if it was computed for storage; see `explain`.
-        analysis: computes `explain` from the evidence; None without it (`without_evidence`, a pickle, a record).
+            chosen actions, the first of which is to be taken, else empty.
+        certainty: why sampling stopped, if a confidence was required, else None.
+        explanation: the explanation, if it was computed for storage. See `explain`.
+        analysis: computes `explain` from the evidence. None without it (`without_evidence`, a pickle, a record).
     """
 
     planner: str
@@ -149,7 +149,7 @@ class Plan(TabularRepr):
         return Explanation.nothing(self.planner, chosen, f"{self.planner} does not choose by rewards")
 
     def without_evidence(self, *, explained: bool) -> Plan:
-        """Return the plan for storage, without its evidence, which takes memory; `explained`: with its explanation."""
+        """Return the plan for storage, without its evidence, which takes memory. `explained`: with its explanation."""
         explanation = self.explanation
         if explained and self.analysis is not None:
             explanation = self.analysis().without_evidence()

@@ -53,19 +53,19 @@ class JointPlanner:
         instance("search", self.search, JointSearch)
 
     def plan(self, state: State, poses: Floats, *, rng: np.random.Generator) -> Plan:
-        """Return the joint action with the largest mean reward that the search finds; of equal ones the first printed.
+        """Return the joint action with the largest mean reward that the search finds, of equal ones the first printed.
 
         Rewards are equal within 1e-9, relative to the best or to 1.
 
         Args:
-            state: the belief of each sensor, as its filter left it; and the fused belief, from which samples and
+            state: the belief of each sensor, as its filter left it, and the fused belief, from which samples and
                 prediction are taken. With `vedette.tracking.Central` they are all the same.
             poses: (num_sensors, 3 or more) present poses.
             rng: draws the samples, then the random numbers of the search.
 
         Raises:
             InputError: invalid inputs, or more joint actions than the search allows.
-            ModelError, NumericalError: errors of the filters; a reward that is not finite.
+            ModelError, NumericalError: errors of the filters, or a reward that is not finite.
         """
         generator(rng)
         prepared = Preparation.of(self.sensors, self.fusion, self.settings, self.reward, state, poses, self.constraints)
@@ -81,7 +81,7 @@ class IndependentPlanner:
         fusion: fusion rule of their pseudo-updated densities, if the others are assumed to stay.
         settings: horizon, samples, caps.
         reward: one of `vedette.control.rewards`, or a custom one.
-        constraints: limits on each sensor's courses; constraints on pairs of sensors are ignored.
+        constraints: limits on each sensor's courses. Constraints on pairs of sensors are ignored.
         notes: notes that every plan repeats.
         others: what each sensor assumes about the others. "stay": they continue as they are, on the course that changes
             their pose least (`vedette.control.inputs.stationary_courses`), and the reward is that of all scans

@@ -61,7 +61,7 @@ class Preparation:
         sensors, settings, reward: as in the planners.
         planned: beliefs and fusion in the form that they are planned on.
         options: for each sensor.
-        mask: feasible joint actions; None: all.
+        mask: feasible joint actions. None: all.
         graph: of the zones that constraints forbid.
     """
 
@@ -84,7 +84,7 @@ class Preparation:
         poses: Any,
         constraints: Sequence[Constraint] = (),
     ) -> Preparation:
-        """Return the preparation; raises `InputError` for invalid inputs."""
+        """Return the preparation. Raises `InputError` for invalid inputs."""
         options = options_of(sensors, poses, settings)
         planned = planning_beliefs(sensors, fusion, settings, reward, state)
         mask = None
@@ -94,7 +94,7 @@ class Preparation:
 
     @property
     def races(self) -> bool:
-        """Whether samples are added until the decision is certain; the expected loss needs no samples."""
+        """Whether samples are added until the decision is certain. The expected loss needs no samples."""
         return self.settings.confidence is not None and not isinstance(self.reward, ExpectedLossReward)
 
     @property
@@ -105,7 +105,7 @@ class Preparation:
     def evaluator(
         self, num_samples: int, options: tuple[Options, ...] | None = None, *, rng: np.random.Generator
     ) -> Evaluator:
-        """Return the evaluator on newly drawn samples; options: a subset of them. Raises as `JointPlanner.plan`."""
+        """Return the evaluator on newly drawn samples. options: a subset of them. Raises as `JointPlanner.plan`."""
         own, settings = options or self.options, self.settings
         if num_samples != settings.num_samples:
             settings = replace(settings, num_samples=num_samples)
@@ -226,7 +226,7 @@ def _has_glmb(beliefs: Sequence[LabelledDensity]) -> bool:
 
 
 def _why_lmbs(num_sensors: int, fusion: Fusion, settings: PlanningSettings, beliefs: Sequence[LabelledDensity]) -> str:
-    """Return why GLMBs are planned on as their LMBs; empty if they are not. beliefs: the fused one last."""
+    """Return why GLMBs are planned on as their LMBs, empty if they are not. beliefs: the fused one last."""
     if requires_common_prior(fusion):
         return f"{type(fusion).__name__} fuses LMBs"
     if any(belief.is_product for belief in beliefs):
@@ -242,7 +242,7 @@ def _why_lmbs(num_sensors: int, fusion: Fusion, settings: PlanningSettings, beli
 def _rule_of_lmbs(
     num_sensors: int, fusion: Fusion, settings: PlanningSettings, reward: AnyReward
 ) -> LogLinearPool | None:
-    """Return how densities are summed if they are LMBs; None if the decision is not a sum."""
+    """Return how densities are summed if they are LMBs, or None if the decision is not a sum."""
     if isinstance(reward, ExpectedLossReward):
         return _PARALLEL.log_linear_pool(num_sensors)
     if settings.association != "known":

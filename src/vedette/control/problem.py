@@ -34,7 +34,7 @@ def searched(
     late: Callable[[], bool] | None = None,
     rng: np.random.Generator,
 ) -> tuple[int, ...]:
-    """Return the joint action that a search chooses; the evidence then contains it with the lines through it.
+    """Return the joint action that a search chooses. The evidence then contains it with the lines through it.
 
     late: see `JointProblem`.
 
@@ -48,7 +48,7 @@ def searched(
 
 
 def joint_problem(evidence: Evidence, mask: Mask | None) -> JointProblem:
-    """Return the search problem of a joint decision; its evaluations are kept in the evidence."""
+    """Return the search problem of a joint decision. Its evaluations are kept in the evidence."""
     evaluator = evidence.evaluator
     stay = cache(lambda: stationary_courses(evaluator.options, mask))
 
@@ -127,7 +127,7 @@ _SHARE = 0.1
 
 
 def upper_bound(evidence: Evidence, choice: Sequence[int]) -> Bound | None:
-    """Return an upper bound on the best mean reward, computed on the decision's samples; None if no bound is available.
+    """Return an upper bound on the best mean reward, from the decision's samples, or None if no bound is available.
 
     If every joint action was evaluated, the bound is the best of them. Otherwise see `upper_limit`.
     """
@@ -139,7 +139,7 @@ def upper_bound(evidence: Evidence, choice: Sequence[int]) -> Bound | None:
 
 
 def upper_limit(evidence: Evidence) -> Bound | None:
-    """Return the upper bound without a choice's reward (cached); None if rewards are not linear in sums of targets.
+    """Return the upper bound without a choice's reward (cached), or None if rewards are not linear in sums of targets.
 
     Each target gets the joint action that is best for it, and each sensor finds of the undetected targets in every cell
     what its best course there finds. No joint action can be better than that for all of them. Every sensor pays its
@@ -163,7 +163,7 @@ def upper_limit(evidence: Evidence) -> Bound | None:
 
 
 def label_upper_bounds(additive: AdditiveRewards, max_work: int) -> Floats:
-    """Return (num_labels,) upper bounds on the contribution of each label to the mean reward; inf if not known.
+    """Return (num_labels,) upper bounds on the contribution of each label to the mean reward, or inf if not known.
 
     max_work: maximum number of ways to see a label, times samples, that are tried.
     """

@@ -25,7 +25,7 @@ COUNTED = ("filter_steps", "fusions", "rewards")
 
 @dataclass(slots=True, eq=False)
 class ProgramPlanner:
-    """A planner that runs an external program; docs/benchmark.md describes its input and output.
+    """A planner that runs an external program. The page docs/benchmark.md describes its input and output.
 
     The program is started at the first decision of a run, and again if time goes backwards. Its seed is drawn from the
     generator of that decision.
@@ -35,7 +35,7 @@ class ProgramPlanner:
         command: the program and its arguments.
         scene: first message to the program, as plain data.
         settings: the horizon, over which courses are distinguished.
-        constraints: limits on the sensors' courses; an answer that violates them is refused.
+        constraints: limits on the sensors' courses. An answer that violates them is refused.
         estimate: estimator that extracts targets from the fused belief.
         folder: working directory of the program.
         seconds: time limit for an answer.
@@ -66,7 +66,7 @@ class ProgramPlanner:
 
         Raises:
             InputError: invalid inputs, or a command that cannot be started.
-            VedetteError: no answer in time, or an invalid one; the program is ended.
+            VedetteError: no answer in time, or an invalid one. The program is ended.
         """
         generator(rng)
         instance("state", state, State)
@@ -119,7 +119,7 @@ def _target_list(belief: Any) -> list[dict[str, Any]]:
 
 
 def _joint(program: Program, answer: dict[str, Any], options: Sequence[Options], mask: Mask | None) -> tuple[int, ...]:
-    """Return the course of each sensor in the answer; refuses an invalid choice and a forbidden one."""
+    """Return the course of each sensor in the answer. Refuses an invalid choice and a forbidden one."""
     given, num_sensors = answer.get("actions"), len(options)
     if not isinstance(given, list) or len(given) != num_sensors or any(type(each) is not int for each in given):
         got = repr(given)[:200] if "actions" in answer else f"only {', '.join(answer) or 'an empty object'}"

@@ -50,7 +50,7 @@ class PseudoPosteriorRewards:
         posteriors: the pseudo-posteriors of each sensor.
         scanned: for each sensor (num_courses,) whether it scans within the horizon.
         counts: numbers of filter steps, fusions and divergences evaluated so far.
-        notes: notes for readers of the decision, in order of occurrence (keys; values are unused).
+        notes: notes for readers of the decision, in order of occurrence (keys, whose values are unused).
     """
 
     sensors: tuple[MobileSensor, ...]
@@ -96,7 +96,7 @@ class PseudoPosteriorRewards:
         return self.rewards(range(len(self.sensors)), self.fusion)
 
     def alone(self, sensor: int) -> SampleRewards:
-        """Return the reward function of one sensor's own density; its actions have shape (num, 1)."""
+        """Return the reward function of one sensor's own density. Its actions have shape (num, 1)."""
         return self.rewards((sensor,), None)
 
     def rewards(self, sensors: Sequence[int], fusion: Fusion | None) -> SampleRewards:

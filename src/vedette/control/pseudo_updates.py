@@ -41,7 +41,7 @@ from vedette.kernels.planning.reach import label_radii, predict_paths
 def draw_futures(
     fused: Belief, sensors: Sequence[MobileSensor], settings: PlanningSettings, *, rng: np.random.Generator
 ) -> tuple[Ints, tuple[SampledTrajectories, ...]]:
-    """Return samples of the fused density propagated over the horizon without noise; all sensors share the states.
+    """Return samples of the fused density propagated over the horizon without noise. All sensors share the states.
 
     Returns the labels (num_targets, 2) of the sampled targets, and the trajectories for each sensor. The random numbers
     of detections and noise are each sensor's own, and the same for all its actions.
@@ -141,7 +141,7 @@ def _counts(settings: PlanningSettings) -> dict[str, int]:
 
 
 def heaviest_hypotheses(belief: GLMB, max_hypotheses: int) -> GLMB:
-    """Return the `max_hypotheses` heaviest hypotheses of positive weight, normalised; of equal weights the first."""
+    """Return the `max_hypotheses` heaviest hypotheses of positive weight, normalised, of equal weights the first."""
     order = np.argsort(-belief.hyp_log_weights, kind="stable")[:max_hypotheses]
     heaviest = take_hypotheses(belief, order[belief.hyp_log_weights[order] > -np.inf])
     log_weights = heaviest.hyp_log_weights - log_sum(for_kernel(heaviest.hyp_log_weights))
@@ -153,7 +153,7 @@ def merge_similar_tracks(belief: GLMB, max_divergence: float) -> GLMB:
 
     belief: one Gaussian per track, its hypotheses heaviest first. The tracks of heavier hypotheses stay, and those of
     lighter ones are replaced by the first of them that is near enough. Hypotheses that then have the same tracks are
-    merged, and their weights are added. max_divergence: in nats; 0 leaves everything unchanged.
+    merged, and their weights are added. max_divergence: in nats. 0 leaves everything unchanged.
     """
     if max_divergence == 0.0 or len(belief.hyp_tracks) == 0:
         return belief
@@ -172,7 +172,7 @@ def _divergences(means: Floats, covs: Floats) -> Floats:
 
 
 def _leaders(belief: GLMB, divergences: Floats, max_divergence: float) -> Ints:
-    """Return (num_tracks,) the track that replaces each; its own index if it stays, or if no hypothesis has it."""
+    """Return (num_tracks,) the track that replaces each, or its own index if it stays, or if no hypothesis has it."""
     labels, leaders = belief.tracks.labels.tolist(), np.arange(belief.tracks.num_tracks)
     leaders_of: dict[tuple[int, ...], list[int]] = {}
     for track in dict.fromkeys(belief.hyp_tracks.tolist()):

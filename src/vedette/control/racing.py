@@ -48,7 +48,7 @@ class Race:
     Attributes:
         actions: (num_candidates, num_sensors) the joint actions at the start, in printed order.
         confidence, indifference: as in `PlanningSettings`.
-        sensor: the sensor whose actions race; None: joint actions of all sensors, fused.
+        sensor: the sensor whose actions race. None: joint actions of all sensors, fused.
         left: (num_left,) rows of `actions` that are not excluded.
         rewards: (num_left, num_samples) their rewards.
         excluded: for each round, the rows that it excluded and their rewards until then.
@@ -91,7 +91,7 @@ class Race:
 
     @property
     def verdict(self) -> Literal["one left", "indifferent"] | None:
-        """Why the race is over; None while it is not."""
+        """Why the race is over, or None while it is not."""
         if len(self.left) == 1:
             return "one left"
         return "indifferent" if self._near else None

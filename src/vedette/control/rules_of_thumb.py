@@ -29,7 +29,7 @@ _WAITING = 1e6
 
 
 def _nearest(gaps: Floats) -> Ints:
-    """Return each sensor's nearest target not taken by a sensor before it; when all are taken, from all again."""
+    """Return each sensor's nearest target not taken by a sensor before it. When all are taken, from all again."""
     taken = np.zeros(gaps.shape[1], np.int64)
     chosen = []
     for own in gaps:
@@ -43,21 +43,21 @@ class RulePlanner:
     """A planner by a rule of thumb: every sensor heads for a place among the presently estimated targets.
 
     It takes the course that is nearest to that place in the mean over the horizon, which for courses of one speed is
-    the one nearest in heading; a stationary camera turns to it. If no target is estimated, each sensor takes its first
+    the one nearest in heading. A stationary camera turns to it. If no target is estimated, each sensor takes its first
     course. If constraints forbid zones, distances are lengths of shortest paths around them. A place that no path
     reaches is approached as closely as paths allow, and plans name the targets that no sensor can see.
 
     Attributes:
         sensors: the sensors.
-        rule: "nearest": for each sensor, in printed order, its nearest target that no sensor before it took;
-            "assigned_target": the s-th target, in the order of labels, for the s-th sensor; "centroid": the mean of
+        rule: "nearest": for each sensor, in printed order, its nearest target that no sensor before it took.
+            "assigned_target": the s-th target, in the order of labels, for the s-th sensor. "centroid": the mean of
             all, for all sensors.
         settings: the horizon, over which courses are distinguished.
-        constraints: limits on the sensors' courses; each sensor takes its best feasible course, and a joint action that
+        constraints: limits on the sensors' courses. Each sensor takes its best feasible course, and a joint action that
             is not allowed is replaced by a feasible one near it. If only some sensors may scan, those that come nearest
             do.
         estimate: estimator that extracts targets from the fused belief.
-        targets: for "assigned_target": the number of each sensor's target instead, counted from 1; numbers beyond the
+        targets: for "assigned_target": the number of each sensor's target instead, counted from 1. Numbers beyond the
             last target start again from the first.
 
     Raises:
@@ -87,7 +87,7 @@ class RulePlanner:
         return self.rule
 
     def plan(self, state: State, poses: Floats, *, rng: np.random.Generator) -> Plan:
-        """Return the courses that head for the rule's places; of equal ones the first in printed order. Draws nothing.
+        """Return the courses that head for the rule's places, of equal ones the first in printed order. Draws nothing.
 
         Raises `InputError` for invalid inputs, and the errors of the estimator.
         """
@@ -125,7 +125,7 @@ class RulePlanner:
 
 
 def _merits(own: Options, goal: Floats | None, graph: VisibilityGraph) -> Floats:
-    """Return (num_courses,) the negative mean distance to a place; ties are broken by how well a camera points."""
+    """Return (num_courses,) the negative mean distance to a place. Ties are broken by how well a camera points."""
     if goal is None:
         return np.zeros(len(own.courses))
     offsets = goal - own.courses[..., :2]

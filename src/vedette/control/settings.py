@@ -51,37 +51,37 @@ class PlanningSettings:
         num_samples: multi-target samples of the expected reward, M, the same ones for every action and sensor (paper:
             40). With `confidence`, as many as needed instead.
         ideal_measurements: pseudo-measurements of a sample, never with clutter. "ideal": noise-free, of the targets
-            whose detection probability is at least `detection_threshold`; "expected": noise-free, of targets detected
-            at random with that probability, so that the mean over samples is the expectation over detections;
+            whose detection probability is at least `detection_threshold`. "expected": noise-free, of targets detected
+            at random with that probability, so that the mean over samples is the expectation over detections.
             "sampled": detected at random, with measurement noise.
         detection_threshold: minimum detection probability of a target in ideal measurements (paper-notes 12).
         association: pseudo-updates of LMB beliefs. "known": each pseudo-measurement comes from its own target or from
             clutter, so that labels are independent and rewards are sums over them, which is fast for any number of
-            targets and sensors; "full": the filter's own update, with its data association.
+            targets and sensors. "full": the filter's own update, with its data association.
         max_glmb_sensors: with more sensors GLMB beliefs are planned on as LMBs, and plans say so.
         max_glmb_targets: the same with more targets expected.
         undetected_target_value: value of finding a target of `undetected`: a factor on the reward's cost of a missed
-            target (`missed_cost`: for the expected loss, its cutoff to the power of its order); for rewards without
-            such a cost, a number in their units; none: 1 for the former, 0 for the latter; 0: undetected targets are
+            target (`missed_cost`: for the expected loss, its cutoff to the power of its order). For rewards without
+            such a cost, a number in their units. none: 1 for the former, 0 for the latter. 0: undetected targets are
             ignored. Undetected targets are assumed not to move.
-        end: s, time of the last scan, on the clock of `State.time`: later decisions are not planned for; None: no end.
+        end: s, time of the last scan, on the clock of `State.time`: later decisions are not planned for. None: no end.
         max_prior_hypotheses: most hypotheses, the heaviest, of each local posterior at the start of the horizon. An LMB
             is not reduced.
         max_version_divergence: densities of one label within this divergence of each other are merged into that of the
-            heavier hypothesis at the start of the horizon; 0: none are [nats].
+            heavier hypothesis at the start of the horizon. 0: none are [nats].
         max_bound_work: maximum number of ways to see a target, times samples, that are tried for the bound of a plan.
         confidence: samples are added until the choice is the best of its candidates with this confidence, regardless of
-            `num_samples`; see `vedette.control.racing`.
-        indifference: with `confidence`: acceptable shortfall from the best mean reward, as a fraction of its magnitude;
+            `num_samples`. See `vedette.control.racing`.
+        indifference: with `confidence`: acceptable shortfall from the best mean reward, as a fraction of its magnitude.
             0.01 is one per cent.
         max_samples: with `confidence`: number of samples after which the decision is taken as it stands.
         max_seconds: time after which the decision is taken as it stands, at the end of a round of samples, of which at
-            least one is run; a search with rounds or restarts then ends with the best action found, after at least one.
-            Results of a seed then depend on the speed of the machine; none: no limit [s].
+            least one is run. A search with rounds or restarts then ends with the best action found, after at least one.
+            Results of a seed then depend on the speed of the machine. none: no limit [s].
         limits: caps of the pseudo-updates, whose hypotheses are ranked, not Gibbs sampled, whatever the filter does.
             Every label set of the prior keeps its heaviest hypothesis beyond these caps, and an LMB keeps all its
             labels. Tracks that are mixtures are replaced by one Gaussian of their moments beforehand.
-        num_threads: threads that share a decision; 0: one per processor. The result does not depend on it.
+        num_threads: threads that share a decision. 0: one per processor. The result does not depend on it.
 
     Raises:
         InputError: a field out of range.
@@ -133,9 +133,9 @@ class MobileSensor:
         filter: its local filter, with the models of the targets and of the sensor. The joint and the independent
             planner need a labelled filter, whose belief is a `GLMB`, an `LMB` or a `FactoredGLMB`.
         platform: its possible actions, and the poses that follow.
-        scan_times: s, increasing, as `State.time`: times of its scans; None: at every pseudo-update. A pseudo-update
+        scan_times: s, increasing, as `State.time`: times of its scans. None: at every pseudo-update. A pseudo-update
             counts if it scans at least once in the period that ends with it.
-        belief: type of the filter's labelled density; None if it has no labels.
+        belief: type of the filter's labelled density, or None if it has no labels.
         abilities: optional members of the platform.
 
     Raises:
@@ -162,7 +162,7 @@ class MobileSensor:
             object.__setattr__(self, "scan_times", times)
 
     def scans(self, now: float | None, settings: PlanningSettings) -> Bools:
-        """Return (horizon_steps,) which pseudo-updates of a decision at time `now` count; None: not known, all."""
+        """Return (horizon_steps,) which pseudo-updates of a decision at time `now` count. None: not known, all."""
         num, period = settings.horizon_steps, settings.horizon_period
         if self.scan_times is None or now is None:
             return np.ones(num, np.bool_)

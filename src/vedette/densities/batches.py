@@ -37,10 +37,10 @@ class DensityBatch:
         factor_offsets: (num_factors + 1,) into `sets`.
         sets: label sets, factor after factor.
         log_weights: (num_cases, num_sets) log weight of each set in its factor.
-        means, covs: (num_cases, num_members, ...) one Gaussian for each label of each set, in order; without meaning
+        means, covs: (num_cases, num_members, ...) one Gaussian for each label of each set, in order, without meaning
             if a GLMB's set has log weight -inf.
         num_samples: for planners: case `action * num_samples + sample` is of this action and this sample.
-        num_threads: threads that may share work on the cases; the result does not depend on it.
+        num_threads: threads that may share work on the cases. The result does not depend on it.
     """
 
     kind: type[GLMB] | type[LMB]
@@ -74,7 +74,7 @@ class DensityBatch:
 
     @classmethod
     def of(cls, density: LabelledDensity) -> DensityBatch:
-        """Return a batch of one LMB or marginalised GLMB; mixtures are replaced by one Gaussian of their moments."""
+        """Return a batch of one LMB or marginalised GLMB. Mixtures are replaced by one Gaussian of their moments."""
         tracks = single_gaussians(density.tracks).to_kernel()
         gaussians = tracks.components
         if isinstance(density, LMB):
@@ -107,7 +107,7 @@ class DensityBatch:
 
     @property
     def places(self) -> tuple[FactorSet, ...]:
-        """Each label set with the name of its factor; the sets of several batches are matched by it."""
+        """Each label set with the name of its factor. The sets of several batches are matched by it."""
         sizes = np.diff(self.factor_offsets).tolist()
         names = (name for name, size in zip(self.factors, sizes, strict=True) for _ in range(size))
         return tuple(zip(names, self.sets, strict=True))

@@ -115,7 +115,7 @@ def distinct_labels(labels: Ints) -> tuple[Ints, Ints]:
 
 
 def run_log_sums(log_weights: Floats, offsets: Ints) -> Floats:
-    """Return the log-sum-exp of each run of `log_weights`; runs must not be empty."""
+    """Return the log-sum-exp of each run of `log_weights`. Runs must not be empty."""
     if len(offsets) == 1:
         return np.empty(0)
     peaks = np.maximum.reduceat(log_weights, offsets[:-1])
@@ -160,7 +160,7 @@ def check_covariances(field: str, covs: Floats, error: type[VedetteError] = Nume
 
 
 def no_classes() -> Floats:
-    """Return the class probabilities of components without classes; a container gives them their length."""
+    """Return the class probabilities of components without classes. A container gives them their length."""
     return np.empty((0, 0))
 
 

@@ -35,7 +35,7 @@ class Container(SummaryRepr):
     __slots__ = ()
 
     def _own_arrays(self) -> None:
-        """Replace the given arrays by copies; a public constructor calls this before its checks."""
+        """Replace the given arrays by copies. A public constructor calls this before its checks."""
         for name in self.__match_args__:  # type: ignore[attr-defined]
             object.__setattr__(self, name, self._owned(getattr(self, name)))
 
@@ -44,7 +44,7 @@ class Container(SummaryRepr):
         return _held(np.array(value, order="C")) if type(value) is np.ndarray else value
 
     def with_fields(self, **changed: Any) -> Self:
-        """Return a copy with other values of some fields, without checks; see `unchecked`."""
+        """Return a copy with other values of some fields, without checks. See `unchecked`."""
         made = object.__new__(type(self))
         for name in self.__match_args__:  # type: ignore[attr-defined]
             object.__setattr__(made, name, _held(changed[name]) if name in changed else getattr(self, name))
@@ -86,7 +86,7 @@ class Components(Container):
 
     @property
     def num_classes(self) -> int:
-        """Number of classes of targets; 0 if they have none."""
+        """Number of classes of targets, or 0 if they have none."""
         return int(self.marks.log_class_probs.shape[1])
 
     def _components(self) -> Mixture:
@@ -127,7 +127,7 @@ class MultiTarget(Container, TabularRepr):
 
     @abstractmethod
     def cardinality(self) -> Floats:
-        """Return the probabilities of 0, 1, ..., n targets; see `vedette.densities.cardinality_distribution`."""
+        """Return the probabilities of 0, 1, ..., n targets. See `vedette.densities.cardinality_distribution`."""
 
 
 def unchecked(container: type[_Made], *fields: Any) -> _Made:
@@ -149,7 +149,7 @@ def unchecked(container: type[_Made], *fields: Any) -> _Made:
 
 
 def for_kernel(array: NDArray[Any]) -> Any:
-    """Return the writeable array behind a container's field, for kernels; other arrays are returned as they are."""
+    """Return the writeable array behind a container's field, for kernels. Other arrays are returned as they are."""
     return array if array.flags.writeable else array.base
 
 
@@ -169,7 +169,7 @@ def no_components(like: Any) -> Mixture:
 
 
 def _held(value: Any) -> Any:
-    """Return an array as a read-only field, without a copy if possible, also in marks; anything else as it is."""
+    """Return an array as a read-only field, without a copy if possible, also in marks, and anything else as it is."""
     if type(value) is not np.ndarray:
         return Marks(*map(_held, value)) if type(value) is Marks else value
     base, flags = value.base, value.flags

@@ -50,16 +50,16 @@ def marginalise(
     log_min_weight: float = DEFAULT_LOG_MIN_WEIGHT,
     merge_distance: float = DEFAULT_MERGE_DISTANCE,
 ) -> _Glmb:
-    """Return the marginalised form of a delta-GLMB: one hypothesis per label set (paper eq. 10; Fantacci and Vo 2015).
+    """Return the marginalised form of a delta-GLMB: one hypothesis per label set (paper eq. 10, Fantacci and Vo 2015).
 
     The probability of every label set is preserved, and so are the cardinality distribution and the existence
     probabilities. Each track of a label set becomes the mixture of its label's tracks in the set's hypotheses. With
     `max_components` 1 (the default) that is one Gaussian of the mixture's mean and covariance. Otherwise components
     lighter than `log_min_weight` (log, relative to the track) are dropped, those within the Mahalanobis distance
-    `merge_distance` are merged, and the heaviest `max_components` are kept; a `merge_distance` of 0 merges nothing.
+    `merge_distance` are merged, and the heaviest `max_components` are kept. A `merge_distance` of 0 merges nothing.
 
     Hypotheses are returned by descending weight, equal weights in the order of their first occurrence. A product of
-    GLMBs is marginalised factor by factor, in their order; factors of one label in the form of `FactoredGLMB.of`
+    GLMBs is marginalised factor by factor, in their order. Factors of one label in the form of `FactoredGLMB.of`
     keep the order of their hypotheses. Raises `InputError` for a limit outside its range.
     """
     caps = _checked_caps(max_components, log_min_weight, merge_distance)
@@ -69,7 +69,7 @@ def marginalise(
 
 
 def marginalised_factors(density: FactoredGLMB, caps: MixtureCaps) -> FactoredGLMB:
-    """Return the density with every factor marginalised, in order; those in the form of an LMB keep it."""
+    """Return the density with every factor marginalised, in order. Those in the form of an LMB keep it."""
     bernoulli = density.is_bernoulli
     if bernoulli.all() and len(density.tracks.log_weights) == density.num_factors:
         return density
@@ -112,7 +112,7 @@ def as_lmb(
     """Return the LMB with the existence probability and density of every label (Reuter et al. 2014, eq. 43-45).
 
     The existence probabilities and so the mean cardinality are preserved, but not the whole cardinality distribution.
-    Mixtures are reduced as by `marginalise`; an LMB is returned unchanged. Raises `InputError` for a limit outside its
+    Mixtures are reduced as by `marginalise`. An LMB is returned unchanged. Raises `InputError` for a limit outside its
     range.
     """
     if isinstance(density, LMB):
@@ -164,7 +164,7 @@ def resolve_labels(
 
 
 def with_single_gaussians(density: _Labelled) -> _Labelled:
-    """Return the density with each mixture replaced by the Gaussian of its moments; GLMBs are marginalised."""
+    """Return the density with each mixture replaced by the Gaussian of its moments. GLMBs are marginalised."""
     if density.is_lmb:
         return density.with_fields(tracks=single_gaussians(density.tracks))
     given: Any = density
@@ -172,7 +172,7 @@ def with_single_gaussians(density: _Labelled) -> _Labelled:
 
 
 def with_resolved_labels(density: LabelledDensity, max_components: int) -> LabelledDensity:
-    """Return the density; a product of GLMBs with ambiguous labels is replaced by its `resolve_labels`."""
+    """Return the density. A product of GLMBs with ambiguous labels is replaced by its `resolve_labels`."""
     if not isinstance(density, FactoredGLMB) or density.is_bernoulli.all():
         return density
     return FactoredGLMB.of(resolve_labels(density, max_components=max_components))
@@ -182,7 +182,7 @@ def as_glmb(density: LabelledDensity, *, max_hypotheses: int) -> tuple[GLMB, flo
     """Return the GLMB of the `max_hypotheses` heaviest hypotheses of all factors, and the weight of the others.
 
     A hypothesis of the product combines one hypothesis of each factor. For an LMB these are its most probable label
-    subsets; a GLMB is one factor. The GLMB shares the track table; its weights are normalised over the kept hypotheses,
+    subsets. A GLMB is one factor. The GLMB shares the track table. Its weights are normalised over the kept hypotheses,
     which are in order of descending weight. Products of weight zero are left out. Raises `InputError` for a
     `max_hypotheses` below 1.
     """
@@ -191,7 +191,7 @@ def as_glmb(density: LabelledDensity, *, max_hypotheses: int) -> tuple[GLMB, flo
 
 
 def lmb_on_label_sets(lmb: LMB, sets: Sequence[Sequence[tuple[int, ...]]]) -> GLMB:
-    """Return the LMB's hypotheses on those label sets that it has, in their order; their weights do not sum to one."""
+    """Return the LMB's hypotheses on those label sets that it has, in their order. Their weights do not sum to one."""
     place = {tuple(label): i for i, label in enumerate(lmb.tracks.labels.tolist())}
     hyps = [[place[label] for label in labels] for labels in sets if all(label in place for label in labels)]
     exists = np.zeros((len(hyps), len(place)), np.bool_)

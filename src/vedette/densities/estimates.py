@@ -53,7 +53,7 @@ class Estimate(TabularRepr):
         covs: (num_targets, state_dim, state_dim) their covariances.
         existence: (num_targets,) probability that the label's target exists, over the whole density.
         class_probs: (num_targets, num_classes) probability of each class of target, which sum to 1, in the order of
-            `BirthModel.class_probs`; without columns if targets have no classes.
+            `BirthModel.class_probs`, without columns if targets have no classes.
     """
 
     labels: Ints
@@ -80,7 +80,7 @@ class Estimate(TabularRepr):
         return self._targets().each()
 
     def to_table(self) -> dict[str, list[Any]]:
-        """Return a table by columns, with one row per target; the columns are those of the table of a density."""
+        """Return a table by columns, with one row per target. The columns are those of the table of a density."""
         return self._targets().columns("existence")
 
     def plot(self, ax: Any) -> None:
@@ -133,9 +133,9 @@ def map_estimate(density: LabelledDensity) -> Estimate:
     """Return the most probable number of labelled targets, and the most probable ones of it (paper, Algorithm 1).
 
     GLMB: the heaviest hypothesis of that cardinality. LMB: that many labels of highest existence. Product of GLMBs: the
-    heaviest hypothesis of that cardinality among all products of one of each factor. Ties: the smaller number; the
-    earlier hypothesis; the smaller label. A track that is a mixture is estimated by its heaviest component, since the
-    mean of two rival components may lie where the target cannot be.
+    heaviest hypothesis of that cardinality among all products of one of each factor. Ties: the smaller number, then the
+    earlier hypothesis, then the smaller label. A track that is a mixture is estimated by its heaviest component, since
+    the mean of two rival components may lie where the target cannot be.
     """
     given: Any = check_labelled(density)
     if not isinstance(given, GLMB | LMB):
@@ -157,7 +157,7 @@ def least_ospa_estimate(density: LabelledDensity) -> Estimate:
 
     The most probable number, in contrast, counts candidates that are unrelated: of nine targets of probability 0.11 it
     reports one, which is wrong in eight cases of nine. Targets without a label are not counted.
-    Ties: the smaller number; then as `map_estimate`. A mixture is estimated by its heaviest component.
+    Ties: the smaller number, then as `map_estimate`. A mixture is estimated by its heaviest component.
     """
     given = check_labelled(density)
     return _peaks(given.tracks, *least_ospa_tracks(given.to_factors()))
@@ -245,14 +245,14 @@ def at_dominant_components(density: LMB) -> LMB:
 
 
 def unlabelled_estimate(density: Poisson | IidCluster | MultiBernoulli, step: int) -> Estimate:
-    """Return the targets of an unlabelled density; at every step they get new labels (step, 0), (step, 1), ...
+    """Return the targets of an unlabelled density. At every step they get new labels (step, 0), (step, 1), ...
 
     Multi-Bernoulli: the most probable number of targets, and that many Bernoullis of highest existence, each estimated
-    by its heaviest component. Iid cluster: the most probable number; Poisson: the expected number, rounded; that many
+    by its heaviest component. Iid cluster: the most probable number. Poisson: the expected number, rounded. That many
     of the heaviest components, each one target. A component that was chosen is ranked again by its remaining weight if
-    that is a whole target or more (weight 2 stands for two); with half a target or more it only precedes components
+    that is a whole target or more (weight 2 stands for two). With half a target or more it only precedes components
     lighter than 0.2. There are fewer components than targets if all targets are at one position. Existence is the
-    remaining weight of the component, at most 1. Ties: the smaller number; the earlier Bernoulli or component.
+    remaining weight of the component, at most 1. Ties: the smaller number, then the earlier Bernoulli or component.
     """
     if isinstance(density, MultiBernoulli):
         number = int(np.argmax(cardinality_distribution(density)))
@@ -288,7 +288,7 @@ def _by_units(weights: Floats, number: int) -> tuple[Ints, Floats]:
 
 @dataclass(frozen=True, slots=True, repr=False)
 class TrackHistory(TabularRepr):
-    """All estimates of one label in order of time; scans at which it was not estimated are left out.
+    """All estimates of one label in order of time. Scans at which it was not estimated are left out.
 
     Attributes:
         label: birth step and birth index.
@@ -315,7 +315,7 @@ class TrackHistory(TabularRepr):
 
 
 def track_histories(estimates: Sequence[Estimate], times: Floats) -> tuple[TrackHistory, ...]:
-    """Return the estimates of successive scans at `times` (s), grouped by label; labels in increasing order.
+    """Return the estimates of successive scans at `times` (s), grouped by label, with labels in increasing order.
 
     The first estimate is that of step 1.
 

@@ -35,13 +35,13 @@ class FactoredGLMB(Hypotheses):
     combinations.
 
     Attributes:
-        tracks: track table of all factors; the tracks of a factor are adjacent.
+        tracks: track table of all factors. The tracks of a factor are adjacent.
         track_offsets: (num_factors + 1,) tracks of factor `f` are `track_offsets[f]:track_offsets[f + 1]`.
         hyp_offsets: (num_hyps + 1,) tracks of hypothesis `h` are `hyp_tracks[hyp_offsets[h]:hyp_offsets[h + 1]]`.
         hyp_tracks: indices into `tracks`, in increasing label order within a hypothesis.
         hyp_log_weights: (num_hyps,) log weights, normalised within each factor.
         factor_offsets: (num_factors + 1,) hypotheses of factor `f` are `factor_offsets[f]:factor_offsets[f + 1]`.
-        undetected: targets without a label, independent of all others; None if there are none.
+        undetected: targets without a label, independent of all others, or None if there are none.
 
     The arrays are copied, checked once at creation, and read-only afterwards.
 
@@ -69,7 +69,7 @@ class FactoredGLMB(Hypotheses):
 
     @property
     def is_bernoulli(self) -> Bools:
-        """Mask (num_factors,) of the factors of one label; see `bernoulli_factors`."""
+        """Mask (num_factors,) of the factors of one label, see `bernoulli_factors`."""
         return bernoulli_factors(self.to_kernel())
 
     @property
@@ -193,7 +193,7 @@ class FactoredGLMB(Hypotheses):
         self._validate_labels()
 
     def _factors_fit(self) -> bool:
-        """Return True if each factor is a normalised GLMB; checks all at once, as there may be thousands."""
+        """Return True if each factor is a normalised GLMB. Checks all at once, as there may be thousands."""
         owner = np.repeat(self.factor_of, np.diff(self.hyp_offsets))
         if not (
             (self.track_offsets[owner] <= self.hyp_tracks) & (self.hyp_tracks < self.track_offsets[owner + 1])
@@ -221,7 +221,7 @@ class FactoredGLMB(Hypotheses):
 
 
 def sets_of_factors(hypotheses: kt.Glmb, factor_of: Ints) -> tuple[Ints, Ints]:
-    """Return `group_by_label_set` with separate sets for hypotheses of different factors; factor_of: (num_hyps,)."""
+    """Return `group_by_label_set` with separate sets for hypotheses of different factors. factor_of: (num_hyps,)."""
     set_of, first = group_by_label_set(hypotheses)
     if (factor_of == factor_of[:1]).all():
         return set_of, first

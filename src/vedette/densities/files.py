@@ -41,7 +41,7 @@ _UNDETECTED = "undetected"
 
 
 def save_density(path: str | os.PathLike[str], density: Density) -> None:
-    """Write a density to `path`. The file appears whole or not at all; equal densities give equal bytes.
+    """Write a density to `path`. The file appears whole or not at all. Equal densities give equal bytes.
 
     Raises `InputError` for a path that cannot be written.
     """
@@ -89,7 +89,7 @@ def _kind_of(source: Path, arrays: Mapping[str, Any]) -> str:
 
 
 def _arrays(container: Any, prefix: str = "") -> dict[str, Any]:
-    """Return the arrays of a container by their names in a file; without sources and marks that there are not."""
+    """Return the arrays of a container by their names in a file, without sources and marks that there are not."""
     arrays: dict[str, Any] = {}
     for field in fields(container):
         name, value = f"{prefix}{field.name}", getattr(container, field.name)

@@ -57,7 +57,7 @@ class Hypotheses(LabelledDensity):
         return labels[held], np.minimum(np.bincount(label_of, weights, len(labels))[held], 1.0)
 
     def with_labels(self, labels: Ints) -> Self:
-        """Return the density with other labels (num_tracks, 2); distinct labels must stay distinct."""
+        """Return the density with other labels (num_tracks, 2). Distinct labels must stay distinct."""
         members, hyps = labels[self.hyp_tracks], np.repeat(np.arange(self.num_hyps), np.diff(self.hyp_offsets))
         order = np.lexsort((members[:, 1], members[:, 0], hyps))
         return self.with_fields(tracks=self.tracks.with_fields(labels=labels), hyp_tracks=self.hyp_tracks[order])
@@ -65,7 +65,7 @@ class Hypotheses(LabelledDensity):
 
 @dataclass(frozen=True, slots=True, repr=False)
 class GLMB(Hypotheses):
-    """delta-GLMB density (paper eq. 4); marginalised delta-GLMB (eq. 10) if every label set occurs once.
+    """delta-GLMB density (paper eq. 4), marginalised delta-GLMB (eq. 10) if every label set occurs once.
 
     Attributes:
         tracks: track table shared by all hypotheses.

@@ -68,7 +68,7 @@ class Targets(NamedTuple):
         return {**names, weight: self.weights.tolist(), **taken, **state_columns(self.means, self.covs)}
 
     def draw(self, axes: Any) -> None:
-        """Draw position ellipses of two standard deviations into axes of Matplotlib; improbable targets are faint."""
+        """Draw position ellipses of two standard deviations into axes of Matplotlib. Improbable targets are faint."""
         if self.means.shape[1] < 2:
             raise InputError(
                 f"plot: expected states that begin with x and y; got {pluralise(self.means.shape[1], 'number')}"

@@ -27,7 +27,7 @@ WHOLE = MixtureCaps(-math.inf, 0.0, 2**62)  # leaves mixtures unchanged
 
 
 class LabelSets(NamedTuple):
-    """Label sets of a belief in the order of their first hypothesis; groups: (num_hyps,) set of each hypothesis."""
+    """Label sets of a belief in the order of their first hypothesis. groups: (num_hyps,) set of each hypothesis."""
 
     sets: tuple[LabelSet, ...]
     groups: Ints
@@ -43,7 +43,7 @@ def label_sets(belief: LabelledDensity) -> LabelSets:
 
 
 def take_hypotheses(belief: GLMB, places: Ints) -> GLMB:
-    """Return the hypotheses at `places`, in that order, with only their tracks; their weights are not normalised."""
+    """Return the hypotheses at `places`, in that order, with only their tracks. Their weights are not normalised."""
     offsets, entries = take_runs(belief.hyp_offsets, places)
     used, renumbered = np.unique(belief.hyp_tracks[entries], return_inverse=True)
     return unchecked(
@@ -92,7 +92,7 @@ def lmb_of_factors(density: FactoredGLMB, factors: Ints) -> LMB:
 def as_single_factor(glmb: GLMB) -> FactoredGLMB:
     """Return a GLMB as one factor.
 
-    With one label it has the form of `FactoredGLMB.of`; with no label there is no factor. Nothing is lost: the
+    With one label it has the form of `FactoredGLMB.of`. With no label there is no factor. Nothing is lost: the
     tracks of one label become one mixture of all their components.
     """
     labels, _ = distinct_labels(glmb.tracks.labels[glmb.hyp_tracks])
@@ -101,7 +101,7 @@ def as_single_factor(glmb: GLMB) -> FactoredGLMB:
 
 
 def without_zero_weights(belief: _Labelled) -> _Labelled:
-    """Return the belief without hypotheses of weight zero; a product keeps all tracks."""
+    """Return the belief without hypotheses of weight zero. A product keeps all tracks."""
     given: Any = belief
     if belief.is_lmb or (kept := given.hyp_log_weights > -math.inf).all():
         return belief
@@ -175,8 +175,8 @@ def with_replaced_tracks(belief: GLMB, links: Ints) -> GLMB:
 class JoinedFactors(NamedTuple):
     """The smallest groups of the factors of several densities such that no two groups share a label.
 
-    Groups are in increasing order of their first labels. Each density is the product of its parts in the groups;
-    factors without labels are in none.
+    Groups are in increasing order of their first labels. Each density is the product of its parts in the groups.
+    Factors without labels are in none.
 
     densities: the densities of the factors. groups: for each density, (num_factors,) the group of each factor, or -1.
     alone: (num_groups,) True if all factors in the group are of its only label, in the form of `FactoredGLMB.of`.

@@ -27,8 +27,8 @@ LABELLED = "a GLMB, an LMB or a FactoredGLMB"  # description in messages
 class LabelledDensity(MultiTarget):
     """A labelled multi-target density: a product of factors, each a weighted list of label sets, over one track table.
 
-    An LMB is one factor per label, with the sets {} and {l}; a GLMB is one factor; a FactoredGLMB any number of them.
-    Operations that all of them support are methods of this class, so that callers need not distinguish them.
+    An LMB is one factor per label, with the sets {} and {l}. A GLMB is one factor, and a FactoredGLMB any number of
+    them. Operations that all of them support are methods of this class, so that callers need not distinguish them.
 
     Attributes:
         tracks: track table of all factors.
@@ -54,7 +54,7 @@ class LabelledDensity(MultiTarget):
 
     @property
     def num_classes(self) -> int:
-        """Number of classes of targets; 0 if they have none."""
+        """Number of classes of targets, or 0 if they have none."""
         return self.tracks.num_classes
 
     @property
@@ -82,7 +82,7 @@ class LabelledDensity(MultiTarget):
     def targets(self) -> Iterator[Target]:
         """Iterate over label, existence probability, mean and covariance of each target, in increasing label order.
 
-        Mean and covariance are those of the label's marginal density, over all hypotheses and components; for an
+        Mean and covariance are those of the label's marginal density, over all hypotheses and components. For an
         estimate that keeps rival components apart see `vedette.densities.map_estimate`.
         """
         return self._targets().each()
@@ -92,7 +92,7 @@ class LabelledDensity(MultiTarget):
 
         `measurements` has, label by label, the row of the last scan that the hypothesis associates with the target,
         None if it was missed. It is known, and not None as a whole, after the scan of a `DeltaGlmbFilter` that is not
-        marginalised; `TrackTable.sources` gives the previous track of each. In an LMB and in a product of GLMBs a track
+        marginalised. `TrackTable.sources` gives the previous track of each. In an LMB and in a product of GLMBs a track
         combines the effect of all measurements.
 
         For a product, such as an LMB, these are products of one hypothesis of each factor. The weights are
@@ -152,19 +152,19 @@ class LabelledDensity(MultiTarget):
         """Return the factors as a kernel bundle."""
 
     def as_hypotheses(self) -> kt.Glmb:
-        """Return the hypotheses of all factors as one list; its weights sum to the number of factors."""
+        """Return the hypotheses of all factors as one list. Its weights sum to the number of factors."""
         factors = self.to_factors()
         return kt.Glmb(factors.tracks, factors.hyp_offsets, factors.hyp_tracks, factors.hyp_log_weights)
 
     @abstractmethod
     def with_labels(self, labels: Ints) -> Self:
-        """Return the density with other labels (num_tracks, 2); distinct labels must stay distinct."""
+        """Return the density with other labels (num_tracks, 2). Distinct labels must stay distinct."""
 
     def validate(self, *, error: type[VedetteError] = NumericalError) -> None:
         """Raise unless the tracks are probability densities, and hypotheses are normalised and in label order.
 
-        `InputError` for faults of form; `error` for values that are not finite, not normalised to 1e-9 or covariances
-        that are not symmetric positive definite.
+        `InputError` for faults of form, and `error` for values that are not finite, not normalised to 1e-9 or
+        covariances that are not symmetric positive definite.
         """
         self.tracks.validate(error=error)
         self._validate_form(error)

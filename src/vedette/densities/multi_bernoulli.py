@@ -48,7 +48,7 @@ class MultiBernoulli(Unlabelled):
     _weight: ClassVar[str] = "existence"
 
     def targets(self) -> Iterator[Target]:
-        """Iterate over existence probability, mean and covariance of each Bernoulli; their labels are None."""
+        """Iterate over existence probability, mean and covariance of each Bernoulli. Their labels are None."""
         return self._targets().each()
 
     def _targets(self) -> Targets:
@@ -107,8 +107,8 @@ class MultiBernoulli(Unlabelled):
     def validate(self, *, error: type[VedetteError] = NumericalError) -> None:
         """Raise unless existences are logits and every Bernoulli's mixture is a probability density.
 
-        `InputError` for faults of form; `error` for NaN values, values not normalised to 1e-9 or covariances that are
-        not symmetric positive definite.
+        `InputError` for faults of form, and `error` for NaN values, values not normalised to 1e-9 or covariances that
+        are not symmetric positive definite.
         """
         checks.check_array("existence_logit", self.existence_logit, np.float64, (None,))
         num = self.num_bernoullis

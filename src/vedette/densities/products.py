@@ -147,7 +147,7 @@ def precompute_products(
 
 
 def _restricted(cases: DensityBatch, chosen: Ints) -> DensityBatch:
-    """Return the cases on some of their sets, without normalisation; factors without a set are dropped."""
+    """Return the cases on some of their sets, without normalisation. Factors without a set are dropped."""
     counts = np.histogram(chosen, cases.factor_offsets)[0] if len(cases.factors) else np.empty(0, np.int64)
     starts = cases.set_offsets
     members = np.array([m for i in chosen.tolist() for m in range(starts[i], starts[i + 1])], np.int64)

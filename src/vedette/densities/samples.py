@@ -28,7 +28,7 @@ class MultiTargetSamples(SummaryRepr):
 
     Attributes:
         offsets: (num_samples + 1,) targets of sample `i` are `offsets[i]:offsets[i + 1]`.
-        labels: (num_targets, 2) label of each target, in increasing order within a sample; -1, -1 if the density
+        labels: (num_targets, 2) label of each target, in increasing order within a sample, or -1, -1 if the density
             has no labels.
         states: (num_targets, state_dim).
     """

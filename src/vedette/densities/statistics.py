@@ -11,7 +11,7 @@ from vedette.kernels.base.types import Floats, Ints
 
 
 def cardinality_distribution(density: MultiTarget) -> Floats:
-    """Return the probabilities of 0, 1, ..., n targets; they sum to one.
+    """Return the probabilities of 0, 1, ..., n targets. They sum to one.
 
     n is the size of the largest hypothesis of a GLMB (for a product of GLMBs, the sum over factors), the number of
     labels of an LMB and of Bernoullis of a multi-Bernoulli, and the largest number in an iid cluster. A Poisson density

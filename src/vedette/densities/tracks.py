@@ -1,4 +1,4 @@
-"""The track table of labelled densities: labels and Gaussian mixtures, flat with offsets; parts and moments."""
+"""The track table of labelled densities: labels and Gaussian mixtures, flat with offsets, and parts and moments."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ class TrackTable(Components):
         covs: (num_components, state_dim, state_dim), symmetric positive definite.
         marks: optional columns of the components, such as log probabilities of classes.
         sources: (num_tracks, 2) origin of each track in a `DeltaGlmbFilter`: its track in the previous belief, -1 if it
-            was born; and the row of its measurement in the scan, -1 if it was missed, -2 if there was no scan (a
+            was born, and the row of its measurement in the scan, -1 if it was missed, -2 if there was no scan (a
             prediction). None for tracks made of several, or by another filter, and if the origin is unknown.
 
     The arrays are copied, checked once at creation, and read-only afterwards.
@@ -64,7 +64,7 @@ class TrackTable(Components):
 
     @property
     def measurements(self) -> Ints | None:
-        """Measurements in `sources`, shape (num_tracks,); None if they are unknown or there was no scan."""
+        """Measurements in `sources`, shape (num_tracks,), or None if they are unknown or there was no scan."""
         return None if self.sources is None or (self.sources[:, 1] == UNSCANNED).any() else self.sources[:, 1]
 
     def to_kernel(self) -> kt.Tracks:
@@ -119,8 +119,8 @@ class TrackTable(Components):
     def validate(self, *, error: type[VedetteError] = NumericalError) -> None:
         """Raise unless every array has its type and shape and every track is a probability density.
 
-        `InputError` for faults of form; `error` for values that are not finite, not normalised to 1e-9 or covariances
-        that are not symmetric positive definite.
+        `InputError` for faults of form, and `error` for values that are not finite, not normalised to 1e-9 or
+        covariances that are not symmetric positive definite.
         """
         checks.check_array("tracks.labels", self.labels, np.int64, (None, 2))
         checks.check_mixtures("tracks.", self, self.offsets, self.num_tracks, error)
@@ -160,7 +160,7 @@ def relabelled_tracks(tracks: TrackTable, labels: Ints) -> TrackTable:
 
 
 def places_of(labels: Ints, table: Ints) -> Ints:
-    """Return the place of each label among the distinct labels of a table, shape (num_labels,); -1 if absent."""
+    """Return the place of each label among the distinct labels of a table, shape (num_labels,), or -1 if absent."""
     place = {tuple(label): i for i, label in enumerate(table.tolist())}
     return np.array([place.get(tuple(label), -1) for label in labels.tolist()], np.int64)
 
@@ -226,5 +226,5 @@ def run_moments(weights: Floats, means: Floats, covs: Floats, offsets: Ints) -> 
 
 
 def heaviest_components(log_weights: Floats, offsets: Ints, chosen: Ints) -> Ints:
-    """Heaviest component of each chosen mixture of a density, shape (len(chosen),); the first on a tie."""
+    """Heaviest component of each chosen mixture of a density, shape (len(chosen),), the first on a tie."""
     return heaviest_of_runs(for_kernel(log_weights), for_kernel(offsets), np.array(chosen, np.int64))

@@ -23,9 +23,9 @@ class UndetectedTargets(SummaryRepr):
     Attributes:
         intensity: expected number of undetected targets by state, from birth sites and from dropped labels.
         next_label: birth step and index of the label that the next measurement may begin.
-        cells: expected number of undetected targets that appeared anywhere in a region, by cell; None if there are
+        cells: expected number of undetected targets that appeared anywhere in a region, by cell, or None if there are
             none.
-        birth_rate: posterior of their birth rate if it is learnt; None if it is given.
+        birth_rate: posterior of their birth rate if it is learnt, or None if it is given.
 
     Raises:
         InputError: a part of another kind, no label, or a birth rate of another number of cells.
@@ -72,7 +72,7 @@ class UndetectedTargets(SummaryRepr):
 class LearntRate(SummaryRepr):
     """Posterior of the rate of Poisson births, a gamma density, given the first detections of the targets.
 
-    At a birth rate of 1/s, the expected number of targets detected so far is `exposure`; the number of first detections
+    At a birth rate of 1/s, the expected number of targets detected so far is `exposure`. The number of first detections
     is then Poisson with mean rate times exposure.
 
     Attributes:
@@ -117,7 +117,7 @@ class UndetectedIntensity(SummaryRepr):
 
     Attributes:
         grid: the cells of a region.
-        expected: (num_cells,) mean number of undetected targets in each; copied.
+        expected: (num_cells,) mean number of undetected targets in each, copied.
 
     Raises:
         InputError: another number of cells, or a number that is negative or not finite.
@@ -167,5 +167,5 @@ class UndetectedIntensity(SummaryRepr):
 
     @property
     def table(self) -> Floats:
-        """Expected numbers as a map (rows, columns) whose first row is the southern one; for drawing."""
+        """Expected numbers as a map (rows, columns) whose first row is the southern one, for drawing."""
         return self.expected.reshape(self.grid.rows, self.grid.columns).copy()

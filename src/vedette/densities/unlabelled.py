@@ -103,8 +103,8 @@ class Poisson(Unlabelled):
     def validate(self, *, error: type[VedetteError] = NumericalError) -> None:
         """Raise unless every array has its type and shape and every component is a Gaussian.
 
-        `InputError` for faults of form; `error` for values that are not finite or covariances that are not symmetric
-        positive definite.
+        `InputError` for faults of form, and `error` for values that are not finite or covariances that are not
+        symmetric positive definite.
         """
         checks.check_components("", self, error)
 
@@ -127,7 +127,7 @@ class IidCluster(Unlabelled):
 
     Attributes:
         log_cardinality: (most + 1,) log probabilities of 0, 1, ..., most targets, normalised.
-        log_weights: (num_components,) log mixture weights of the density of one target, normalised; there may be none
+        log_weights: (num_components,) log mixture weights of the density of one target, normalised. There may be none
             if the density is certain of no target.
         means: (num_components, state_dim).
         covs: (num_components, state_dim, state_dim).
@@ -185,8 +185,8 @@ class IidCluster(Unlabelled):
     def validate(self, *, error: type[VedetteError] = NumericalError) -> None:
         """Raise unless the cardinalities and the weights are normalised and every component is a Gaussian.
 
-        `InputError` for faults of form; `error` for values that are not finite, not normalised to 1e-9 or covariances
-        that are not symmetric positive definite, and if targets are possible without a density for them.
+        `InputError` for faults of form, and `error` for values that are not finite, not normalised to 1e-9 or
+        covariances that are not symmetric positive definite, and if targets are possible without a density for them.
         """
         checks.check_array("log_cardinality", self.log_cardinality, np.float64, (None,))
         if len(self.log_cardinality) == 0:

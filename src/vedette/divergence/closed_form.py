@@ -35,15 +35,15 @@ def cauchy_schwarz(a: Density, b: Density, *, unit_volume: float = 1.0, support:
     GLMB (Beard et al. 2017, "Void probabilities and Cauchy-Schwarz divergence for generalized labeled multi-Bernoulli
     models"): all pairs of hypotheses that share a label set. LMB: the sum over labels of the Bernoulli divergences. An
     LMB and a GLMB: the LMB is evaluated on the GLMB's label sets. Products of GLMBs: the sum over the smallest groups
-    of labels such that no factor of either density spans two groups; labels that form factors of their own in both are
+    of labels such that no factor of either density spans two groups. Labels that form factors of their own in both are
     compared as LMBs, the others on all products of their factors. Two Poisson densities (Hoang et al. 2015): K / 2
     times the squared L2 distance of the intensities.
 
     unit_volume: K, the unit of hyper-volume of a state (units of the state multiplied), which weighs cardinalities
-        against each other; see `reference_unit_volume`.
+        against each other. See `reference_unit_volume`.
     support: "full" as in the paper. "common" leaves out, in all three terms, the label sets that one of the densities
         lacks (two LMBs, and labels that form factors of their own in both: the labels), because a set that was only
-        removed by a cap is not a difference of the beliefs; the divergence is then 0 too for densities that are
+        removed by a cap is not a difference of the beliefs. The divergence is then 0 too for densities that are
         proportional on their common label sets.
 
     Infinite if the densities have no label set in common. A result below 0 by rounding (1e-11 of the logs' magnitude)
@@ -70,7 +70,7 @@ def cauchy_schwarz(a: Density, b: Density, *, unit_volume: float = 1.0, support:
 
 
 def log_inner_product(a: Density, b: Density, *, unit_volume: float = 1.0) -> float:
-    """Return log zeta(a, b), with zeta the set integral of K^|X| a(X) b(X) (paper eq. 9); -inf if nothing is shared.
+    """Return log zeta(a, b), with zeta the set integral of K^|X| a(X) b(X) (paper eq. 9), or -inf if nothing is shared.
 
     Raises `InputError` for densities that cannot be compared or are not valid.
     """
@@ -84,7 +84,7 @@ def log_inner_product(a: Density, b: Density, *, unit_volume: float = 1.0) -> fl
 
 
 def check_densities(densities: dict[str, Density], unit_volume: float) -> float:
-    """Return the log of the unit volume; raise `InputError` for two densities that cannot be compared."""
+    """Return the log of the unit volume, and raise `InputError` for two densities that cannot be compared."""
     positive("unit_volume", unit_volume)
     for name, density in densities.items():
         if not isinstance(density, Density):
@@ -121,7 +121,7 @@ def log_inner_products(
 
 
 def paired_parts(p: LabelledDensity, q: LabelledDensity) -> list[tuple[LabelledDensity, LabelledDensity]]:
-    """Return parts whose products are p and q, as pairs with the same labels; no two pairs share a label.
+    """Return parts whose products are p and q, as pairs with the same labels. No two pairs share a label.
 
     If neither is a product, the only pair is the densities themselves. Labels that form factors of their own in both
     are combined in one pair of LMBs. The parts of the other pairs are GLMBs of all products of their factors, or LMBs
@@ -198,7 +198,7 @@ def _poisson(a: Poisson, b: Poisson, log_unit_volume: float) -> float:
 
 
 def _overlap(tracks: Tracks, i: int, j: int, log_unit_volume: float) -> float:
-    """Return K times the integral of the product of two intensities; `NumericalError` if it is not a number."""
+    """Return K times the integral of the product of two intensities. Raises `NumericalError` if it is not a number."""
     try:
         return math.exp(log_unit_volume + log_tracks(tracks, i, j))
     except OverflowError:

@@ -33,15 +33,15 @@ _MASSES = ((1.0, 0.0), (0.0, 1.0))
 def power_integral(
     p: LabelledDensity, q: LabelledDensity, a: float, b: float, *, unit_volume: float = 1.0, support: Support = "full"
 ) -> float:
-    """Return Z(a, b): the log of the set integral of K^((a + b - 1) |X|) p(X)^a q(X)^b; dimensionless.
+    """Return Z(a, b): the log of the set integral of K^((a + b - 1) |X|) p(X)^a q(X)^b, dimensionless.
 
     Divergences of the power family are made of these: Cauchy-Schwarz is (Z(2, 0) + Z(0, 2)) / 2 - Z(1, 1), Renyi of an
     order (Z(order, 1 - order) - order Z(1, 0) - (1 - order) Z(0, 1)) / (order - 1).
 
     Args:
-        p, q: GLMBs, LMBs or products of GLMBs. With an LMB and a GLMB, the LMB is evaluated on the GLMB's label sets;
-            with products, Z is the sum over groups of labels, as in `cauchy_schwarz`.
-        a, b: exponents; one of them may be negative, or 0 if the other is above 0. A density to the power of 0 is 1.
+        p, q: GLMBs, LMBs or products of GLMBs. With an LMB and a GLMB, the LMB is evaluated on the GLMB's label sets.
+            With products, Z is the sum over groups of labels, as in `cauchy_schwarz`.
+        a, b: exponents. One of them may be negative, or 0 if the other is above 0. A density to the power of 0 is 1.
         unit_volume: K, as in `cauchy_schwarz`.
         support: "full", or "common": only the label sets that both densities have (two LMBs, and labels that form
             factors of their own in products: the labels).
@@ -100,7 +100,7 @@ def _of_parts(
 def renyi(p: LabelledDensity, q: LabelledDensity, order: float, *, support: Support = "full") -> float:
     """Return the Renyi divergence of p from q: log(integral of p^order q^(1 - order)) / (order - 1), both normalised.
 
-    At least 0, and 0 for equal densities. Order 1/2 is symmetric and twice the Bhattacharyya distance; in general it is
+    At least 0, and 0 for equal densities. Order 1/2 is symmetric and twice the Bhattacharyya distance. In general it is
     order / (1 - order) times that of q from p of order 1 - order. As the order approaches 1 it becomes the
     Kullback-Leibler divergence. Above 1 it is infinite if p is not small enough relative to q, as for a p much wider
     than q.
@@ -108,7 +108,7 @@ def renyi(p: LabelledDensity, q: LabelledDensity, order: float, *, support: Supp
     Args:
         p, q: GLMBs, LMBs or products of GLMBs, of single Gaussians, as in `power_integral`.
         order: above 0 and not 1.
-        support: "full"; or "common", and then both are normalised on the label sets (labels) that both have.
+        support: "full", or "common", and then both are normalised on the label sets (labels) that both have.
 
     Infinite if they share none. A result below 0 by rounding is 0. Raises `InputError` as `power_integral` and for
     another order, and `NumericalError` if rounding leaves it further below.

@@ -23,9 +23,9 @@ _AZIMUTHS = ("course_deg", "azimuth_deg")
 class ActionAxis(NamedTuple):
     """The actions of a sensor along an axis.
 
-    name: of the axis: `heading`, or the names of all columns; unit: `deg`, or empty. places: (num_actions,) position of
-    each action. ticks: the numbers alone. labels: in words. is_numeric: True if places are the numbers of a column;
-    otherwise they count actions from 1.
+    name: of the axis: `heading`, or the names of all columns. unit: `deg`, or empty. places: (num_actions,) position of
+    each action. ticks: the numbers alone. labels: in words. is_numeric: True if places are the numbers of a column.
+    Otherwise they count actions from 1.
     """
 
     name: str
@@ -88,7 +88,7 @@ def rounded(columns: Sequence[str], row: Floats) -> Row:
 
 
 def drawn_angle(row: Mapping[str, float], heading: str = "heading_deg", azimuth: str = "course_deg") -> float | None:
-    """Return the direction of an action for a drawing, deg counter-clockwise from east; None if it has none.
+    """Return the direction of an action for a drawing, deg counter-clockwise from east, or None if it has none.
 
     True north is drawn upwards, wherever the sensor is.
     """

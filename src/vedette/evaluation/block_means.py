@@ -24,7 +24,7 @@ class BlockMean(NamedTuple):
     freedom: float
 
     def away_from(self, value: float) -> float:
-        """Return the distance to a value in standard deviations of a normal distribution; 0 for few blocks.
+        """Return the distance to a value in standard deviations of a normal distribution, or 0 for few blocks.
 
         It has the same tail probability as Student's distribution (Wallace 1959, eq. 2.3).
         """
@@ -35,7 +35,7 @@ class BlockMean(NamedTuple):
         return scale * math.sqrt(self.freedom * math.log1p(ratio**2 / self.freedom))
 
     def minus(self, other: BlockMean) -> BlockMean:
-        """Return the difference to the mean of other blocks, which vary alike; it counts with the fewer blocks."""
+        """Return the difference to the mean of other blocks, which vary alike. It counts with the fewer blocks."""
         both, freedom = (self, other), self.freedom + other.freedom
         variance = sum(each.freedom * max(each.num, 1) * each.error**2 for each in both) / freedom
         error = math.sqrt(variance * sum(1.0 / max(each.num, 1) for each in both))

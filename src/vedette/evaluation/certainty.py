@@ -8,7 +8,7 @@ from vedette.control.plan import Plan
 
 
 def lead_words(plan: Plan) -> str:
-    """Return the lead in mean reward over the runner-up, `0.071 (3.3 std. errors)`; empty if it is not recorded."""
+    """Return the lead in mean reward over the runner-up, `0.071 (3.3 std. errors)`, empty if it is not recorded."""
     runner_up = None if plan.explanation is None else plan.explanation.runner_up
     if runner_up is None:
         return ""
@@ -19,7 +19,7 @@ def lead_words(plan: Plan) -> str:
 
 
 def optimality_words(plan: Plan) -> str:
-    """Return `yes` for a proven optimum, `within 6.1 %` of it, or `not known`; empty for decisions without a bound."""
+    """Return `yes` for a proven optimum, `within 6.1 %` of it, or `not known`, empty for decisions without a bound."""
     bound = None if plan.explanation is None else plan.explanation.bound
     if bound is None:
         return ""

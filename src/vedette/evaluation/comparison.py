@@ -28,8 +28,8 @@ class Comparison(SummaryRepr):
     A `part` is "total", "localisation" or "cardinality", of OSPA, or the name of a measure.
 
     Attributes:
-        strategies: their names; the others are compared with the first.
-        ensembles: the runs of each strategy; the n-th runs of all share their random numbers.
+        strategies: their names. The others are compared with the first.
+        ensembles: the runs of each strategy. The n-th runs of all share their random numbers.
         since, until: scans after `since` (s) and up to `until` (s) count in the mean over time.
         unit: of OSPA: "m", or none ("") if it compares whole states.
     """
@@ -80,7 +80,7 @@ class Comparison(SummaryRepr):
         return np.asarray((self.times > self.since) & (self.times <= self.until))
 
     def run_means(self, strategy: str, part: str = "total") -> Floats:
-        """Return the mean of each run over the counted scans that have a value, (num_runs,); NaN if none has one."""
+        """Return the mean of each run over the counted scans that have a value, (num_runs,), or NaN if none has one."""
         return mean_of_known(self.values(strategy, part)[:, self.counted])
 
     def summary(self, strategy: str, part: str = "total") -> Summary:
@@ -104,7 +104,7 @@ class Comparison(SummaryRepr):
         return np.concatenate([[np.nan], holm(np.array(uncorrected, np.float64))])
 
     def decision_shares(self, strategy: str, decision: int) -> dict[Choice, float]:
-        """Return the share of the runs in which each combination of actions was chosen; the most frequent first."""
+        """Return the share of the runs in which each combination of actions was chosen, the most frequent first."""
         chosen = Counter(run[decision] for run in self._ensemble(strategy).choices if decision < len(run))
         return {choice: count / self.num_runs for choice, count in chosen.most_common()}
 
@@ -131,12 +131,12 @@ def compare(
     """Compare the runs of several strategies.
 
     Args:
-        runs: for each strategy its runs; the n-th runs of all must have the same scenario, seed and run number.
+        runs: for each strategy its runs. The n-th runs of all must have the same scenario, seed and run number.
         metrics: measures of the same runs, to be compared as well.
-        since: only scans after this time (s) count in the mean over time; by default the time of the first decision,
+        since: only scans after this time (s) count in the mean over time, by default the time of the first decision,
             before which all strategies are alike, and every scan if no decision was made before the last scan.
         until: only scans up to this time (s) count.
-        unit: of OSPA; none ("") if it compares whole states.
+        unit: of OSPA, none ("") if it compares whole states.
 
     Raises `InputError` if there is no run, or the runs are not paired.
     """
@@ -183,7 +183,7 @@ def compare_scored_scans(scenario: Scenario, ensembles: Mapping[str, Ensemble]) 
 def counted_scans(record: RunRecord, scenario: Scenario | None) -> Bools:
     """Return whether each scan of a run counts in its mean error, (num_scans,).
 
-    The scans are those that `compare_scored_scans` counts; without a scenario, those after the first decision. All
+    The scans are those that `compare_scored_scans` counts, or without a scenario, those after the first decision. All
     count if the run stopped before the first of them.
     """
     runs = {record.planner: build_ensemble([(record.summary(), None)])}
@@ -194,7 +194,7 @@ def counted_scans(record: RunRecord, scenario: Scenario | None) -> Bools:
 
 
 def mean_of_known(values: Floats) -> Floats:
-    """Return the mean of each row over its numbers, (num_runs,); NaN if it has none."""
+    """Return the mean of each row over its numbers, (num_runs,), or NaN if it has none."""
     known = ~np.isnan(values)
     if known.all():
         return np.asarray(values.mean(axis=1))

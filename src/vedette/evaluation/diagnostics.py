@@ -40,12 +40,12 @@ class Diagnostic(NamedTuple):
 
 
 def run_diagnostics(health: Health, sensors: Sequence[str] = ()) -> tuple[Diagnostic, ...]:
-    """Return every diagnostic of one run; sensors: their names."""
+    """Return every diagnostic of one run. sensors: their names."""
     return diagnostics(summarise_health(health_sums([health]), sensors))
 
 
 def record_diagnostics(record: RunRecord, scenario: Scenario | None) -> tuple[Diagnostic, ...]:
-    """Return every diagnostic of one run; without the scenario, those of new targets are left out."""
+    """Return every diagnostic of one run. Without the scenario, those of new targets are left out."""
     if scenario is None:
         return run_diagnostics(record.health)
     return (*run_diagnostics(record.health, scenario.model.sensor_names), *birth_diagnostics(record, scenario))
@@ -58,7 +58,7 @@ def birth_diagnostics(record: RunRecord, scenario: Scenario) -> Iterator[Diagnos
 
 
 def diagnostics_line(results: Sequence[Diagnostic]) -> str:
-    """Return the diagnostics that are not `ok` in one line; `no limit reached, nothing truncated` if all are."""
+    """Return the diagnostics that are not `ok` in one line, or `no limit reached, nothing truncated` if all are."""
     shown = [f"{each.name[0].lower()}{each.name[1:]}: {each.text}" for each in results if each.level != "ok"]
     return "; ".join(shown) or "no limit reached, nothing truncated"
 
@@ -69,7 +69,7 @@ def diagnostics(health: HealthSummary) -> tuple[Diagnostic, ...]:
 
 
 def _level(value: float, check_above: float = 0.0) -> Level:
-    """Return `check` above `check_above`, `note` above 0; with infinite `check_above` never `check`."""
+    """Return `check` above `check_above`, `note` above 0, and with infinite `check_above` never `check`."""
     return "check" if value > check_above else "note" if value > 0.0 else "ok"
 
 
@@ -190,7 +190,7 @@ def _measurement_diagnostics(health: HealthSummary) -> Iterator[Diagnostic]:
 
 
 def new_target_diagnostics(targets: NewTargets | None, health: Health, num_labels: int) -> Iterator[Diagnostic]:
-    """Yield the diagnostics of new targets; targets: those that are expected in these scans, None if not known."""
+    """Yield the diagnostics of new targets. targets: those that are expected in these scans, None if not known."""
     from scipy.special import gammaincc
 
     late = 0.0 if targets is None else targets.late_share

@@ -12,7 +12,7 @@ def doubtful_parameters(problem: Problem, recorded: RecordingScenario, fit: Fit)
 
     Args:
         problem: from `vedette.scenarios.calibration.build_problem`.
-        recorded: the recording; its assumptions tell whether clutter was given. Biases of 0 count as not given.
+        recorded: the recording. Its assumptions tell whether clutter was given. Biases of 0 count as not given.
         fit: of a run with the present parameters.
     """
     tests, names = {(each.sensor, each.test) for each in fit.findings}, recorded.scenario.model.sensor_names

@@ -40,14 +40,14 @@ class Ensemble(SummaryRepr):
         times: (num_scans,) s.
         ospa: (num_runs, num_scans, 3) total, localisation and cardinality parts.
         num_targets: (num_runs, num_scans) number of true targets, in the smallest type that holds it.
-        measures: (num_runs, num_scans) for each measure that all runs have, by the name of its column; whole numbers in
+        measures: (num_runs, num_scans) for each measure that all runs have, by the name of its column. Whole numbers in
             the smallest type that holds them: `values` returns them as floats.
-        choices: for each run, the choices of its decisions; equal ones are one object.
+        choices: for each run, the choices of its decisions. Equal ones are one object.
         decision_times: (num_decisions,) s, of all runs together, increasing.
         health: sums of the reports of filters and fusion.
         rewards: for each decision, in order, sums of the rewards.
-        seconds: for each stage, the wall time at all scans of all runs, s, in single precision; `planning` only at the
-            decisions.
+        seconds: for each stage, the wall time at all scans of all runs, s, in single precision, with `planning` only at
+            the decisions.
         counts: for each count of the plans, its number in every decision that has it.
     """
 
@@ -100,7 +100,7 @@ def build_ensemble(runs: Iterable[Measured]) -> Ensemble:
 
 
 def concatenate_ensembles(parts: Sequence[Ensemble]) -> Ensemble:
-    """Return the runs of several ensembles, one after the other; raises like `build_ensemble`."""
+    """Return the runs of several ensembles, one after the other. Raises like `build_ensemble`."""
     if not parts:
         raise InputError("runs: expected at least one run of each of one or more strategies")
     if len(parts) == 1:
@@ -188,7 +188,7 @@ def _check_alike(scenario: str, times: Floats, other: str, other_times: Floats, 
 
 
 def _smallest_ints(values: NDArray[Any]) -> NDArray[Any]:
-    """Return whole numbers in the smallest signed type that holds them; other arrays unchanged."""
+    """Return whole numbers in the smallest signed type that holds them, and other arrays unchanged."""
     if values.dtype != np.int64:
         return values
     return values.astype(np.min_scalar_type(-1 - int(np.abs(values).max(initial=0))))

@@ -62,15 +62,15 @@ class Fit(NamedTuple):
 
     @classmethod
     def from_dict(cls, data: Any) -> Fit | None:
-        """Return the fit of plain data; None if there is none, as in runs of simulated scans."""
+        """Return the fit of plain data, or None if there is none, as in runs of simulated scans."""
         if not isinstance(data, Mapping):
             return None
         return cls(tuple(Finding(**each) for each in data["findings"]), data["searched"])
 
     def lines(self, num_warnings: int = 0) -> list[str]:
-        """Return the texts of the findings; without any, one line that names the tests.
+        """Return the texts of the findings, or without any, one line that names the tests.
 
-        num_warnings: warnings of the scenario that were shown; then nothing is called faultless.
+        num_warnings: warnings of the scenario that were shown. Then nothing is called faultless.
         """
         if self.findings:
             return [each.text for each in self.findings]
@@ -82,7 +82,7 @@ class Fit(NamedTuple):
 def fit_of_run(record: RunRecord, scenario: Scenario) -> Fit:
     """Return what the assumed model does not explain in a run.
 
-    Filters of labelled tracks are needed; for others, and for runs of one scan, nothing is searched. Of a long run
+    Filters of labelled tracks are needed. For others, and for runs of one scan, nothing is searched. Of a long run
     stretches of successive scans are looked at. Raises `VedetteError` for scans that cannot be read or drawn again.
     """
     rows, assumed = rows_of_record(record, scenario), Assumed.of(scenario)
@@ -99,7 +99,7 @@ def fit_of_run(record: RunRecord, scenario: Scenario) -> Fit:
 def fit_of(instants: Sequence[Compared], assumed: Assumed, times: Sequence[ArrayLike] | None = None) -> Fit:
     """Return what the assumed model does not explain in some instants, in order of time.
 
-    times: of all scans of each sensor in a run, s; None: the instants are a window of the latest scans.
+    times: of all scans of each sensor in a run, s. None: the instants are a window of the latest scans.
     """
     if not any(len(each.labels) for each in instants):
         return Fit((), NOTHING)

@@ -19,7 +19,7 @@ _SAMPLES = 200  # of clutter, for its share in a place; and scans of it that are
 
 
 def detection_by_place(offsets: Floats, made: Floats, likely: Floats, compass: bool) -> str | None:
-    """Return in words where detections differ from the expected ones other than elsewhere; None if nowhere.
+    """Return in words where detections differ from the expected ones other than elsewhere, or None if nowhere.
 
     offsets: (num_blocks, 2) mean positions relative to the sensor of blocks of successive scans of a track, m. made,
     likely: (num_blocks, 2) sums and numbers of detections, and of their probabilities. compass: whether directions
@@ -44,7 +44,7 @@ def detection_by_place(offsets: Floats, made: Floats, likely: Floats, compass: b
 
 
 def clutter_by_place(fit: SensorFit, sensor: SensorModel, state_dim: int, compass: bool) -> str | None:
-    """Return in words where more measurements are unexplained than clutter explains; None if nowhere.
+    """Return in words where more measurements are unexplained than clutter explains, or None if nowhere.
 
     state_dim: of the targets. compass: as in `detection_by_place`.
     """

@@ -118,7 +118,7 @@ def gap_log_ratios(
 ) -> GapRatios:
     """Return, for pairs of labels, the log likelihood ratio of one target with a gap against all alternatives.
 
-    Label i ended with existence r and density N(m, P) at its last estimate; the first of label j is n scans later. With
+    Label i ended with existence r and density N(m, P) at its last estimate. The first of label j is n scans later. With
     P_S(n) the probability of surviving until then, U = h / n + (1 - h) * product of 1 - P_D over the scans between (h
     is `prob_hidden`), p_i the density N(m, P) predicted to that time, L_j the likelihood of the first scans of j, D the
     intensity of undetected targets there, G the probability that target i, which may have died, is detected by no scan
@@ -133,7 +133,7 @@ def gap_log_ratios(
     This is exact for linear Gaussian models and a probability of detection that is the same everywhere, if the first
     estimate of j is from the scan that began it. D is the default filter's intensity of targets that no scan has
     detected. L_j is the product of the information that each estimate of j adds to the previous one, predicted to its
-    time; the first estimate is divided by the component of D that it began from, so that this prior counts only in D.
+    time. The first estimate is divided by the component of D that it began from, so that this prior counts only in D.
 
     Args:
         histories: of all labels, see `track_histories`.
@@ -212,7 +212,7 @@ def _likely_pairs(pairs: Sequence[GapRatios], histories: Sequence[TrackHistory],
 def _estimate_information(
     history: TrackHistory, prior: Mixture, observations: ObservationHistory
 ) -> Iterator[_Information]:
-    """Yield the information in the scans of each of the first estimates; prior: of births, before the first."""
+    """Yield the information in the scans of each of the first estimates. prior: of births, before the first."""
     scans = (history.steps[:_FIRST_ESTIMATES] - 1).tolist()
     covs, offsets = prior.covs + history.covs[0], prior.means - history.means[0]
     squared = (offsets * np.linalg.solve(covs, offsets[..., np.newaxis])[..., 0]).sum(axis=-1)

@@ -42,7 +42,7 @@ class HealthSums(NamedTuple):
 
 
 def health_sums(healths: Sequence[Health]) -> HealthSums:
-    """Return the sums of runs with the same sensors; raises `InputError` for no run or different numbers of sensors."""
+    """Return the sums of runs with the same sensors. Raises `InputError` for no run or different numbers of sensors."""
     if len({health.num_tracks.shape[1] for health in healths}) != 1:
         raise InputError("records: expected one run or more, of equally many sensors")
 
@@ -81,7 +81,7 @@ def _sum_and_worst(values: Floats) -> tuple[float, int, float]:
 
 
 def add_health_sums(parts: Sequence[HealthSums]) -> HealthSums:
-    """Return the sums over all runs of several sums; raises like `health_sums`."""
+    """Return the sums over all runs of several sums. Raises like `health_sums`."""
     if len({part.unknown_labels.shape for part in parts}) != 1:
         raise InputError("records: expected one run or more, of equally many sensors")
     columns = dict(zip(HealthSums._fields, zip(*parts, strict=True), strict=True))
@@ -92,16 +92,16 @@ def add_health_sums(parts: Sequence[HealthSums]) -> HealthSums:
 
 @dataclass(frozen=True, slots=True)
 class HealthSummary:
-    """Summary over all scans of some runs; a scan counts in a share if the event happened at any sensor.
+    """Summary over all scans of some runs. A scan counts in a share if the event happened at any sensor.
 
     Attributes:
         num_scans: of all runs.
         limit_reached, search_truncated, inexact: share of the scans at which a filter reached a limit, its ranking
             search was cut short, an LMB cluster was not summed exactly.
-        mean_discarded, worst_discarded: upper bound on the share of a filter's weight that was truncated; NaN if
+        mean_discarded, worst_discarded: upper bound on the share of a filter's weight that was truncated, or NaN if
             unknown.
         mean_factoring, worst_factoring: upper bound on the L1 error of a factored filter from treating labels as
-            independent; NaN if unknown.
+            independent, or NaN if unknown.
         worst_dropped: expected number of targets in labels that a filter dropped at one scan.
         duplicates, clutter_raised: total numbers of measurements.
         missing_sets: (num_sensors,) share of the fused label sets (CLMB: labels) that the sensor lacks.
@@ -134,7 +134,7 @@ class HealthSummary:
 
 
 def summarise_health(sums: HealthSums, sensors: Sequence[str] = ()) -> HealthSummary:
-    """Return the summary of runs; sensors: their names, by default `sensor 1` and so on."""
+    """Return the summary of runs. sensors: their names, by default `sensor 1` and so on."""
 
     def mean(total: float, number: int) -> float:
         return total / number if number else np.nan
@@ -163,7 +163,7 @@ def summarise_health(sums: HealthSums, sensors: Sequence[str] = ()) -> HealthSum
 
 
 def percent(share: float) -> str:
-    """Return a share as a whole number of percent; only 0 and 1 become 0 % and 100 %."""
+    """Return a share as a whole number of percent. Only 0 and 1 become 0 % and 100 %."""
     if 0.0 < share < 0.01:
         return "<1 %"
     if 0.99 < share < 1.0:

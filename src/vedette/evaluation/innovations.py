@@ -32,7 +32,7 @@ class Assumed(NamedTuple):
 
     @classmethod
     def of(cls, scenario: Scenario) -> Assumed:
-        """Build the models; raises `InputError` for custom models that cannot be loaded."""
+        """Build the models. Raises `InputError` for custom models that cannot be loaded."""
         model, folder = scenario.model, scenario.folder
         region, method, at = model.region.build(), model.filter.gaussian_method, model.filter.detection_at
         sensors = tuple(each.build(region, method, folder, at) for each in model.sensors)
@@ -42,7 +42,7 @@ class Assumed(NamedTuple):
 class Instant(NamedTuple):
     """A time of a run at which sensors scanned.
 
-    time: s. poses: (num_sensors, 3 or more). rows: measurements of each sensor, with the noise that rows bring; None
+    time: s. poses: (num_sensors, 3 or more). rows: measurements of each sensor, with the noise that rows bring. None
     without a scan. estimate: of the targets after these scans.
     """
 
@@ -57,7 +57,7 @@ class Matches(NamedTuple):
 
     labels: (num, 2). offsets: (num, 2) predicted position relative to the sensor, m. probabilities: (num,) of a
     detection. numbers: (num,) measurements within the gate. by_chance: (num,) expected number of them that are clutter.
-    innovations: (num, meas_dim) of the only measurement inside, NaN if there is not exactly one; variances: of them.
+    innovations: (num, meas_dim) of the only measurement inside, NaN if there is not exactly one. variances: of them.
     noise: (num, meas_dim) variances of the noise alone.
     """
 
@@ -89,7 +89,7 @@ class SensorFit(NamedTuple):
     counts: (num_scans,) measurements in the gate of no track, in the scans that were looked at. pose: at the last of
     these. further: (num_scans, 2) measurements in gates above one for each group of near tracks, and these groups.
     matches: tracks at these scans. unexplained: (num, 2) positions relative to the sensor, m, of measurements in the
-    gate of no track; NaN of sensors that measure no positions.
+    gate of no track, with NaN for sensors that measure no positions.
     """
 
     counts: Ints
@@ -109,7 +109,7 @@ class Compared(NamedTuple):
 
     time: s. own: (num_sensors, 2) positions of the sensors, m. labels: (n, 2) of the tracks. means: (n, 2) their
     positions, m. detected: (n, num_sensors) 1 if a measurement lies in the gate, 0 if none does although one should, -1
-    for no scan, or a track out of view. fits: of the sensors; None without a scan.
+    for no scan, or a track out of view. fits: of the sensors. None without a scan.
     """
 
     time: float
@@ -130,7 +130,7 @@ def joined(fits: Iterable[SensorFit]) -> SensorFit:
 def compared(before: Instant, now: Instant, assumed: Assumed) -> Compared:
     """Return an instant compared with the one before it.
 
-    A track is predicted from its estimate at the instant before, with the motion model; its measurement and Jacobian
+    A track is predicted from its estimate at the instant before, with the motion model. Its measurement and Jacobian
     are linearised there (Kalman innovations). Scans of one time are compared with one prediction.
     """
     labels, means, covs = _predicted(before, now, assumed.motion)
@@ -210,7 +210,7 @@ def _of_scan(
 
 
 def _inside(measured: Floats, expected: Floats, spread: Floats, periods: Floats, gate: float = GATE) -> Bools:
-    """Return True for each track and measurement within the gate, (num_tracks, num_measurements); spread: of a pair."""
+    """Return True for each track and measurement within the gate, (num_tracks, num_measurements). spread: of a pair."""
     if not len(measured):
         return np.zeros((len(expected), 0), np.bool_)
     residuals = measured[None] - expected[:, None]

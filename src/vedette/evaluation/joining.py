@@ -85,7 +85,7 @@ def find_joins(
 def _join_probabilities(pairs: GapRatios, num_labels: int) -> Floats:
     """Return the probability of each pair's join among those of either of its labels, and none, shape (num_pairs,).
 
-    Exact if one of the two has no other; else a little low, as a rival may itself be joined elsewhere.
+    Exact if one of the two has no other, else a little low, as a rival may itself be joined elsewhere.
     """
     ended, began, log_ratios = pairs
     rows, columns = np.full(num_labels, -np.inf), np.full(num_labels, -np.inf)

@@ -1,4 +1,4 @@
-"""Observation of targets: models, times and poses; and the births that may begin the labels of a record."""
+"""Observation of targets: models, times and poses, and the births that may begin the labels of a record."""
 
 from __future__ import annotations
 
@@ -28,13 +28,13 @@ class ObservationHistory:
     """Models of the targets, and the scans that observed them.
 
     Attributes:
-        targets: motion, survival and births, as in the filters; births at sites or anywhere in a region.
+        targets: motion, survival and births, as in the filters, with births at sites or anywhere in a region.
         sensors: model of each sensor.
         times: (num_scans,) of the scans, s.
         poses: (num_scans, num_sensors, 3 or more) of the sensors.
         scanned: (num_scans, num_sensors) True if the sensor scanned.
         prob_hidden: probability that an existing target that is not detected for a while is out of sight, although the
-            detection models do not include it: behind an island, or silent; after n scans it then reappears with
+            detection models do not include it: behind an island, or silent. After n scans it then reappears with
             probability 1 / n. 0: scans miss a target independently, as filters assume, and 12 misses at a probability
             of detection of .95 are next to impossible.
 
@@ -60,7 +60,7 @@ class ObservationHistory:
             raise InputError("targets.birth.from_measurements: expected births in a region; got none")
 
     def scan_interval(self, scan: int) -> float:
-        """Return the seconds since the previous scan; 1 for the first."""
+        """Return the seconds since the previous scan, or 1 for the first."""
         return float(self.times[scan] - self.times[scan - 1]) if scan else 1.0
 
     def predict(self, mixture: Mixture, first: int, last: int) -> Mixture:
@@ -113,7 +113,7 @@ def undetected_priors(observations: ObservationHistory, first_scans: Sequence[in
 
 
 def birth_intensity(belief: FactoredGLMB, history: TrackHistory, observations: ObservationHistory) -> Mixture:
-    """Return the intensity of undetected targets where a label began; births anywhere are one wide Gaussian."""
+    """Return the intensity of undetected targets where a label began. Births anywhere are one wide Gaussian."""
     undetected, labels, birth = belief.undetected, as_lmb(belief), observations.targets.birth
     assert isinstance(undetected, UndetectedTargets)
     at_sites = labels.tracks.to_kernel().components._replace(log_weights=np.log(labels.existence))

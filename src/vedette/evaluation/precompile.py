@@ -28,11 +28,11 @@ def precompile(scenario: Scenario, planners: Sequence[str] = ("jdm",)) -> None:
 
     The other process compiles the fusion and the last of the joint planners, this one the tracker and the others. Each
     finds in the cache the code that the other has already compiled. Code that the other process does not compile (it
-    may be forbidden, or fail) is compiled at its first use; no result depends on it.
+    may be forbidden, or fail) is compiled at its first use. No result depends on it.
 
     Args:
-        scenario: with birth sites, at which targets are placed for the example; without, only the tracker is compiled.
-        planners: names of strategies; those without joint decisions are left out.
+        scenario: with birth sites, at which targets are placed for the example. Without, only the tracker is compiled.
+        planners: names of strategies. Those without joint decisions are left out.
     """
     experiment = build_experiment(scenario)
     has_labels = isinstance(experiment.tracker.initial().fused, LabelledDensity)
@@ -53,7 +53,7 @@ def precompile(scenario: Scenario, planners: Sequence[str] = ("jdm",)) -> None:
 
 
 def _joint_planner(scenario: Scenario, name: str) -> JointPlanner | None:
-    """Return the planner of that name; None if it is not a joint one."""
+    """Return the planner of that name, or None if it is not a joint one."""
     planner = build_planner(scenario, name)
     planner = planner.planner if isinstance(planner, NamedPlanner) else planner
     return planner if isinstance(planner, JointPlanner) else None

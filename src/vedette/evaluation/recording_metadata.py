@@ -14,7 +14,7 @@ class RecordingMetadata(NamedTuple):
     """Clock and names.
 
     start: s, to be added to times of the run. is_utc: True if the sums are seconds since 1970 UTC. names: of the
-    targets, by id; empty if they were not recorded.
+    targets, by id, empty if they were not recorded.
     """
 
     start: float
@@ -23,7 +23,7 @@ class RecordingMetadata(NamedTuple):
 
 
 def recording_metadata(record: RunRecord, scenario: Scenario) -> RecordingMetadata:
-    """Return clock and names from the recordings of a run's scenario; no clock if the scans are not those of the run.
+    """Return clock and names from the recordings of a run's scenario, or no clock if its scans are not from them.
 
     Raises `InputError` if they cannot be read.
     """

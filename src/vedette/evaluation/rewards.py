@@ -24,9 +24,9 @@ class MeanRewards:
 
     Attributes:
         time: s.
-        actions: for each sensor its actions; if headings differ between runs, `turn_deg` from the heading in place of
+        actions: for each sensor its actions. If headings differ between runs, `turn_deg` from the heading in place of
             `heading_deg`, and `turn_right_deg` in place of `course_deg`.
-        tables: like those of a plan, averaged over the runs that evaluated an entry; the standard error is over the
+        tables: like those of a plan, averaged over the runs that evaluated an entry. The standard error is over the
             runs (0 for a single one), and entries that no run evaluated are NaN.
         shares: for each table, the share of the runs in which each of its entries was chosen.
         num_runs: runs that made this decision.
@@ -116,7 +116,7 @@ class RewardSums(NamedTuple):
         return list(zip(self.counts, self.means, self.squares, strict=True))
 
     def mean(self) -> MeanRewards:
-        """Return the means; raises `InputError` if a run evaluated no actions, or runs had different actions."""
+        """Return the means. Raises `InputError` if a run evaluated no actions, or runs had different actions."""
         if self.faults:
             raise InputError(self.faults[0])
         if not self.is_absolute and not self.is_relative:

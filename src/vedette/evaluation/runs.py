@@ -37,9 +37,9 @@ def run_scenario(
         scenario: from `vedette.scenarios.load_scenario`, or the name or file that it reads.
         planner: "jdm" (joint), "idm" (independent), "lookahead" (joint, over several decisions), "nearest",
             "assigned_target" or "centroid" (rules of thumb), "oracle" and "true_targets" (which know the targets),
-            "random", "constant", "stationary", or one of the scenario's own planners; not used for recorded scans.
-        seed, run: fix every random number; runs with equal seed and number are paired across strategies.
-        num_threads: of a decision (0: one per processor); changes no result.
+            "random", "constant", "stationary", or one of the scenario's own planners, not used for recorded scans.
+        seed, run: fix every random number. Runs with equal seed and number are paired across strategies.
+        num_threads: of a decision (0: one per processor), which changes no result.
         progress: called with the number of every finished scan.
 
     Raises:
@@ -67,7 +67,7 @@ def track_recording(
 
     Args:
         scenario: such as that of `vedette.scenarios.from_recording.scenario_from_recording`.
-        recording: its scans; None: read from the file.
+        recording: its scans. None: read from the file.
         seed, run, progress: see `vedette.recorded.Tracking.run`.
 
     Raises:
@@ -77,7 +77,7 @@ def track_recording(
 
 
 def build_score(scenario: Scenario) -> Score | None:
-    """Return the OSPA of estimates at each scan as a function, as the scenario defines it; None: unknown targets."""
+    """Return the OSPA of estimates at each scan as a function, as the scenario defines it. None: unknown targets."""
     ospa = scenario.model.ospa
     if scenario.model.targets.kind == "unknown":
         return None
@@ -85,7 +85,7 @@ def build_score(scenario: Scenario) -> Score | None:
 
 
 def custom_metrics(scenario: Scenario) -> tuple[Metric, ...]:
-    """Return the metrics that a scenario adds to the built-in ones; raises `InputError` if one cannot be loaded."""
+    """Return the metrics that a scenario adds to the built-in ones. Raises `InputError` if one cannot be loaded."""
     return tuple(Metric(name, _build_metric(scenario, section)) for name, section in scenario.model.metrics.items())
 
 
@@ -97,6 +97,6 @@ def _build_metric(scenario: Scenario, section: AnyMetric) -> Measure:
 
 
 def measure_run(record: RunRecord, scenario: Scenario, custom: Sequence[Metric] = ()) -> RunMetrics:
-    """Return all measures of a run by its scenario's cutoff, order and window; raises like `measure`."""
+    """Return all measures of a run by its scenario's cutoff, order and window. Raises like `measure`."""
     ospa = scenario.model.ospa
     return measure(record, cutoff=ospa.cutoff, order=ospa.order, window=ospa.window, custom=custom)

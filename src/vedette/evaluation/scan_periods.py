@@ -40,6 +40,6 @@ def period_findings(times: Sequence[ArrayLike], names: Sequence[str], *, from_st
 
 
 def _period(intervals: Floats) -> float:
-    """Return the period of regular scans from the intervals between them, s; 0 if there is none."""
+    """Return the period of regular scans from the intervals between them, s, or 0 if there is none."""
     median = float(np.median(intervals))
     return median if np.mean(abs(intervals - median) <= _WIDTH * median) >= _REGULAR else 0.0

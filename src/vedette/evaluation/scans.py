@@ -64,7 +64,7 @@ def measurement_code(scenario: Scenario) -> tuple[str, ...]:
 
 
 def scans_of_record(record: RunRecord, scenario: Scenario) -> Scans:
-    """Return for each step one scan per sensor, or None if it did not scan; origins of recorded scans are `UNKNOWN`.
+    """Return for each step one scan per sensor, or None if it did not scan. Origins of recorded scans are `UNKNOWN`.
 
     Raises:
         VedetteError: models or a recording that cannot be loaded, or a recording of other scans.
@@ -92,7 +92,7 @@ def rows_of_record(record: RunRecord, scenario: Scenario) -> Rows:
 
 
 def _recording_of(record: RunRecord, section: RecordingSection, scenario: Scenario) -> RecordedScans:
-    """Return the recording of a run; raises `InputError` for one of other scans."""
+    """Return the recording of a run. Raises `InputError` for one of other scans."""
     recording = section.build(scenario.model, scenario.folder)
     if not np.array_equal(recording.times[: record.num_scans], record.times):
         raise InputError(f"{section.path}: expected the scans of the run; got others")
@@ -116,9 +116,9 @@ def scan_table(record: RunRecord, scenario: Scenario) -> dict[str, list[Any]]:
 
     Columns are `time` (for a turning radar, the time at which its beam passed), `sensor`, the measured quantities
     (`bearing_deg`, `range_m`, `range_rate_mps`, `x_m`, `y_m`), and the sensor poses (`own_x_m`, `own_y_m`,
-    `own_heading_deg`; with range rates also `own_vx_mps`, `own_vy_mps`). Rows of a recording have their columns of
+    `own_heading_deg`, with range rates also `own_vx_mps`, `own_vy_mps`). Rows of a recording have their columns of
     accuracy, in SI units, and empty cells for components that were not measured.
-    Angles are degrees clockwise from true north if every sensor with a bearing has a compass; else they are
+    Angles are degrees clockwise from true north if every sensor with a bearing has a compass, else they are
     `bearing_rad` and `own_heading_rad` from the east, for which a reader needs `bearings: east`. Biases in the scenario
     are removed.
 
@@ -207,6 +207,6 @@ def _accuracy_cells(
 def plane_coordinates(measurements: Floats, kind: str, pose: Floats) -> Floats:
     """Return places of measurements of a kind of `PLANE_SHAPES`, (n, 2) m.
 
-    For rays bearings, (n, 1) rad; for circles radii, (n, 1) m.
+    For rays bearings, (n, 1) rad, and for circles radii, (n, 1) m.
     """
     return places_of(measurements, pose, kind) if kind in PLACED else measurements[:, :1]

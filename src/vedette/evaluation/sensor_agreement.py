@@ -93,7 +93,7 @@ def _parallel_tracks(
 
 
 def _nearest_offset(track: _Track, others: list[_Track], sensor_positions: Floats) -> float | None:
-    """Return the distance to the nearest other track with a constant offset, m; None if there is none near enough."""
+    """Return the distance to the nearest other track with a constant offset, m, or None if none is near enough."""
     nearest: float | None = None
     mean = np.mean(list(track.means.values()), axis=0)
     largest = _MAX_OFFSET_SHARE * float(np.hypot(*(mean - sensor_positions).T).min())

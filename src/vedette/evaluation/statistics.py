@@ -25,8 +25,8 @@ class Summary:
 
     Attributes:
         mean: sample mean.
-        standard_error: sample standard deviation over the root of the number of runs; NaN for a single run.
-        low, high: 95 % confidence interval of the mean by Student's t; NaN for a single run.
+        standard_error: sample standard deviation over the root of the number of runs, or NaN for a single run.
+        low, high: 95 % confidence interval of the mean by Student's t, or NaN for a single run.
         num_runs: number of runs.
     """
 
@@ -42,11 +42,11 @@ class PairedDifference:
     """Difference in cost between two strategies, run by run.
 
     Attributes:
-        summary: of the differences, first minus second; positive if the second is better. Its interval is from a
+        summary: of the differences, first minus second, positive if the second is better. Its interval is from a
             bootstrap if `is_skewed`.
         win_rate: share of the runs in which the second is better (strictly lower).
         tie_rate: share of the runs in which both are equal.
-        p_value: two-sided, of a mean difference of 0, by the same method as the interval; NaN for a single run.
+        p_value: two-sided, of a mean difference of 0, by the same method as the interval, or NaN for a single run.
         is_skewed: True if the differences are too skewed, for their number, for Student's t.
     """
 
@@ -83,7 +83,7 @@ def summarise(values: ArrayLike) -> Summary:
 
 
 def paired_difference(first: ArrayLike, second: ArrayLike) -> PairedDifference:
-    """Compare two strategies whose entries with the same index were run on the same random numbers; lower is better.
+    """Compare two strategies whose entries with the same index were run on the same random numbers. Lower is better.
 
     Args:
         first, second: (num_runs,) one number a run.
@@ -103,7 +103,7 @@ def holm(p_values: ArrayLike) -> Floats:
     """Return p-values corrected for their number: those below 0.05 hold together with 95 % confidence (Holm, 1979).
 
     Args:
-        p_values: (num_tests,); NaN stays, and counts as no test.
+        p_values: (num_tests,). NaN stays, and counts as no test.
 
     Raises `InputError` for values that are not probabilities.
     """

@@ -39,7 +39,7 @@ def strategy_rows(comparison: Comparison) -> list[tuple[str, ...]]:
     """Return one row for each strategy: mean OSPA with standard error, its parts, and the paired difference.
 
     The columns are those of `header`. The difference is strategy minus the first strategy, so positive if the first is
-    better; "Runs won" is the share of runs that the first strategy wins, and the share of ties if there are any. The
+    better. "Runs won" is the share of runs that the first strategy wins, and the share of ties if there are any. The
     first row has no difference.
     """
     return [_row(comparison, strategy) for strategy in comparison.strategies]
@@ -80,7 +80,7 @@ def _latex(text: str) -> str:
 
 
 def significance(comparison: Comparison) -> str:
-    """Return which differences to the first strategy are significant at 5 %, in a sentence; empty for a single run."""
+    """Return which differences to the first strategy are significant at 5 %, in a sentence, empty for a single run."""
     others = list(zip(comparison.strategies, comparison.p_values(), strict=True))[1:]
     if not others or comparison.num_runs < 2:
         return ""
@@ -106,7 +106,7 @@ def decisions_markdown(comparison: Comparison) -> str:
 
 
 def strategy_csv(comparisons: Mapping[str, Comparison] | Comparison) -> str:
-    """Return the unrounded numbers of the table as CSV, one row per strategy; several comparisons with their names."""
+    """Return the unrounded numbers of the table as CSV, one row per strategy, several comparisons with their names."""
     if isinstance(comparisons, Comparison):
         rows = [strategy_numbers(comparisons, strategy) for strategy in comparisons.strategies]
     else:
@@ -174,7 +174,7 @@ def heading(comparison: Comparison) -> str:
 
 
 def legend(comparison: Comparison) -> str:
-    """Return the meaning of the table's columns, in sentences; empty for one run of one strategy."""
+    """Return the meaning of the table's columns, in sentences, empty for one run of one strategy."""
     first, several = comparison.strategies[0], comparison.num_runs > 1
     parts = ["± is one standard error."] if several else []
     if len(comparison.strategies) > 1:

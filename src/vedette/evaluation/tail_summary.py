@@ -37,7 +37,7 @@ def tail_header(unit: str) -> tuple[str, str, str]:
 def summarise_tail(means: ArrayLike, lost: ArrayLike = ()) -> TailSummary:
     """Return the tail of runs from the mean OSPA of each, and whether each ends with a lost target (1 or 0).
 
-    NaN stands for an unknown mean; lost is empty if unknown.
+    NaN stands for an unknown mean, and lost is empty if unknown.
     """
     known_means, ends_lost = np.asarray(means, np.float64), np.asarray(lost, np.float64)
     known_means = known_means[~np.isnan(known_means)]
@@ -53,7 +53,7 @@ def strategy_tail(comparison: Comparison, strategy: str) -> TailSummary:
 
 
 def lost_at_end(comparison: Comparison, strategy: str) -> Floats:
-    """Return 1 for each run that ends with a lost target, else 0, (num_runs,); empty if runs have no such measure."""
+    """Return 1 for each run that ends with a lost target, else 0, (num_runs,), empty if runs have no such measure."""
     if "num_missed" not in comparison.measures:
         return np.empty(0)
     last = int(np.flatnonzero(comparison.counted)[-1])
@@ -61,7 +61,7 @@ def lost_at_end(comparison: Comparison, strategy: str) -> Floats:
 
 
 def tail_sentence(comparison: Comparison) -> str:
-    """Return the tails of all strategies in a sentence; empty for a single run."""
+    """Return the tails of all strategies in a sentence, empty for a single run."""
     if comparison.num_runs == 1:
         return ""
     return tail_text({name: strategy_tail(comparison, name) for name in comparison.strategies}, comparison.unit)

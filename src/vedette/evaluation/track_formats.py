@@ -38,7 +38,7 @@ _DIAGONAL_KNOWN = 2  # type of covariance: only the diagonal is known
 def geojson(table: Table) -> bytes:
     """Return one GeoJSON feature per track: a line through its places (or a point), with times and existence by place.
 
-    `label` is the first label of a track; `labels` has all.
+    `label` is the first label of a track, and `labels` has all.
     """
     features = []
     for track, rows in _tracks("GeoJSON", table).items():
@@ -131,7 +131,7 @@ def _tracks(kind: str, table: Table) -> dict[str, list[int]]:
 
 
 def utc_text(time: float) -> str:
-    """Return seconds since 1970 as ISO 8601, to the millisecond; raises `InputError` beyond years of four digits."""
+    """Return seconds since 1970 as ISO 8601, to the millisecond. Raises `InputError` beyond years of four digits."""
     try:
         moment = _EPOCH + timedelta(seconds=time)
     except OverflowError:

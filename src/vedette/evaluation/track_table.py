@@ -1,4 +1,4 @@
-"""Estimated tracks for other programs: named columns, longitude and latitude, UTC; in files of five formats."""
+"""Estimated tracks for other programs: named columns, longitude and latitude, UTC, in files of five formats."""
 
 from __future__ import annotations
 
@@ -40,16 +40,16 @@ def track_table(
 ) -> dict[str, list[Any]]:
     """Return the estimates by columns, one row for each.
 
-    `time_s` is that of the record plus `start`; `utc` if that is since 1970. `label` is `birth step.index`; `track` is
-    the first label of its track, different from `label` after a gap that `joins` close; `x_m`, `y_m`, `vx_mps`,
+    `time_s` is that of the record plus `start`; `utc` if that is since 1970. `label` is `birth step.index`. `track` is
+    the first label of its track, different from `label` after a gap that `joins` close. `x_m`, `y_m`, `vx_mps`,
     `vy_mps` are the estimate, `std_...` its standard deviations (velocities only if the state has them: four components
-    or more; with `has_height` also `z_m`, `vz_mps`), `existence` is the existence probability. `lon_deg`, `lat_deg`
-    need an origin; `course_deg`, clockwise from true north, and `speed_mps` need a compass. `target` is the name of the
+    or more, with `has_height` also `z_m`, `vz_mps`), `existence` is the existence probability. `lon_deg`, `lat_deg`
+    need an origin. `course_deg`, clockwise from true north, and `speed_mps` need a compass. `target` is the name of the
     true target that OSPA's assignment gives it, nearer than `cutoff` (m), or None.
 
     With `classes`, their names, `class` is the most probable one and `prob_...` the probability of each.
 
-    names: of the true targets, by their ids; else `id + 1`. joins: see `vedette.evaluation.joining`.
+    names: of the true targets, by their ids, else `id + 1`. joins: see `vedette.evaluation.joining`.
     """
     matching = match_run(record.truth, record.estimates, cutoff=cutoff, order=1.0)
     matched_targets = dict(
@@ -113,7 +113,7 @@ def table_of_run(record: RunRecord, scenario: Scenario, joins: Sequence[Join] = 
 def write_tracks(path: Path, table: Mapping[str, Sequence[Any]]) -> None:
     """Write a track table in the format of its file's ending: .csv, .parquet, .geojson, .czml or .mcap.
 
-    The file appears whole or not at all; the contents of the last three are in `vedette.evaluation.track_formats`. A
+    The file appears whole or not at all. The contents of the last three are in `vedette.evaluation.track_formats`. A
     table of scans can be written, too, as .csv or .parquet.
 
     Raises:

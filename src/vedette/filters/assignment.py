@@ -22,7 +22,7 @@ class MarginalAssociation(Protocol):
     """A method by which an LMB filter computes association probabilities."""
 
     def to_kernel(self) -> Association | None:
-        """Return the kernel form of the method; None for the sums over clusters."""
+        """Return the kernel form of the method, or None for the sums over clusters."""
         ...
 
 
@@ -63,9 +63,9 @@ class CustomMarginals:
     The function, of kind `association_marginals` (`vedette.models.model_function`), receives the options of each row of
     a scan, which is a track or a birth: options `offsets[i]:offsets[i + 1]` of row i, heaviest first. `columns` gives
     the meaning of an option: the index of a measurement, from 0 on, which one row may take; -1, present and missed; -2,
-    absent. `log_weights` are relative to the measurement being clutter; the weight of a joint choice, one option per
+    absent. `log_weights` are relative to the measurement being clutter. The weight of a joint choice, one option per
     row, is their product. The function writes the log probability of each option into `out` and returns the log of the
-    total weight of all joint choices, which gives the log likelihood of the scan; -inf if none is possible.
+    total weight of all joint choices, which gives the log likelihood of the scan, or -inf if none is possible.
 
     The result is not known to be exact, so `FilterInfo.truncation_error_bound` is NaN.
 
@@ -94,7 +94,7 @@ class CustomMarginals:
 
 @model_function("association_marginals")
 def belief_propagation(offsets: Ints, columns: Ints, log_weights: Floats, params: Floats, out: Floats) -> float:
-    """Marginals by belief propagation; params: largest number of sweeps, tolerance.
+    """Marginals by belief propagation. params: largest number of sweeps, tolerance.
 
     See `vedette.kernels.association.propagation`.
     """

@@ -46,7 +46,7 @@ StepInputs: TypeAlias = tuple[ScanInput, Motion | None, Sensor, Truncation]
 class SensorStep(NamedTuple):
     """Inputs of one update with the scan of one sensor.
 
-    inputs: in kernel form; the motion is None for a scan at the time of the belief. limits: caps and thresholds.
+    inputs: in kernel form. The motion is None for a scan at the time of the belief. limits: caps and thresholds.
     sensor: the sensor of the scan.
     num_scans: number of scans at this time that update the belief. rng: None if nothing is drawn.
     """
@@ -82,11 +82,11 @@ class WithBirths(SummaryRepr):
     limits: Limits
 
     def limits_of(self, sensor: SensorModel) -> Limits:
-        """Return the limits of an update with a scan of a sensor; see `step_limits`."""
+        """Return the limits of an update with a scan of a sensor. See `step_limits`."""
         return limits_for_births(self.limits, self.targets.birth, sensor.clutter.rate)
 
     def _births(self, dt: float, step: Any, prior: LabelledDensity | None, births: LMB | None) -> Lmb:
-        """Return the labels born within the `dt` seconds before a step, detected or not; see `births_for`."""
+        """Return the labels born within the `dt` seconds before a step, detected or not. See `births_for`."""
         return births_for(self.targets.birth, dt, step, prior, births)
 
 
@@ -129,9 +129,9 @@ class SingleSensorFilter(WithBirths):
         prior: LabelledDensity | None = None,
         births: LMB | None = None,
     ) -> StepInputs:
-        """Return the scan, models and truncation in kernel form and order; for a `dt` of 0 those of an update.
+        """Return the scan, models and truncation in kernel form and order, for a `dt` of 0 those of an update.
 
-        prior: density whose labels the births must not repeat; None if it has none. births: replace those of the
+        prior: density whose labels the births must not repeat, or None if it has none. births: replace those of the
         targets' model.
         """
         if is_zero_duration(dt):
@@ -167,7 +167,7 @@ class LabelledFilterBase(WithBirths, ABC, Generic[BeliefT]):
         return empty
 
     def _before_scan(self, prior: BeliefT, dt: float, step: Any, births: LMB | None) -> Any:
-        """Return the prior as `_run_kernel` expects it. dt: seconds since it; step: of the scan, None for an update."""
+        """Return the prior as `_run_kernel` expects it. dt: seconds since it. step: of the scan, None for an update."""
         return prior.to_kernel()
 
     @abstractmethod
@@ -203,12 +203,12 @@ class LabelledFilter(SingleSensorFilter, LabelledFilterBase[BeliefT]):
 
         Args:
             belief: posterior of the previous step.
-            scan: (num, meas_dim) measurements in any order; angles in radians, in (-pi, pi].
+            scan: (num, meas_dim) measurements in any order, with angles in radians, in (-pi, pi].
             pose: (3 or more,) [px, py, heading_rad, ...] of the sensor.
-            dt: seconds since the previous step; 0 is the same as `update`: no motion, deaths or births.
-            step: number of this step, from 1 on; births at the sites of the targets' model are labelled with it.
-            rng: used only by Gibbs sampling; all filters accept it, so that they are interchangeable.
-            births: birth density since the previous step, in place of those sites; its labels must be later than the
+            dt: seconds since the previous step. 0 is the same as `update`: no motion, deaths or births.
+            step: number of this step, from 1 on. Births at the sites of the targets' model are labelled with it.
+            rng: used only by Gibbs sampling. All filters accept it, so that they are interchangeable.
+            births: birth density since the previous step, in place of those sites. Its labels must be later than the
                 belief's.
 
         Returns:
@@ -241,7 +241,7 @@ class LabelledFilter(SingleSensorFilter, LabelledFilterBase[BeliefT]):
     def update(
         self, belief: LabelledDensity, scan: Any, pose: Any, *, rng: np.random.Generator
     ) -> tuple[BeliefT, FilterInfo]:
-        """Return the posterior after a scan at the time of the belief, with no motion, deaths or births; see `step`."""
+        """Return the posterior after a scan at the time of the belief, with no motion, deaths or births. See `step`."""
         generator(rng)
         measurements, repeats = check_scan(scan, self.sensor, self.targets.num_classes)
         prior = check_belief(belief, self.kind, self.targets)

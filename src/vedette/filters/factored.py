@@ -174,30 +174,30 @@ class FactoredGlmbFilter(_FactoredFilterBase, LabelledFilter[FactoredGLMB]):
     """delta-GLMB filter of one sensor whose density is a product of independent factors.
 
     At a scan, factors that may take the same measurements are multiplied out and updated jointly, exactly as a
-    delta-GLMB; all others are updated independently. Then each factor splits into the smallest factors that are
+    delta-GLMB. All others are updated independently. Then each factor splits into the smallest factors that are
     independent within `max_split_error`. A list of `limits.max_hypotheses` therefore serves a few interacting targets,
     not all of them: the accuracy for a distant target does not depend on the length of the list, and the cost grows
     with the number of targets, not with the number of their combinations. With a `max_split_error` of 2 every label is
-    its own factor, as in an LMB filter (with Poisson births, a PMB filter); with 0, and `max_factor_labels` at least
+    its own factor, as in an LMB filter (with Poisson births, a PMB filter). With 0, and `max_factor_labels` at least
     the number of targets, no dependent factors are split, as in a delta-GLMB filter. The filter draws no random
     numbers. Its predictions are truncated as those of a delta-GLMB filter, factor by factor, but drop no label.
 
     Attributes:
         targets: motion, survival and birth models.
         sensor: model of the sensor.
-        limits: caps and thresholds; those on hypotheses hold for each factor.
+        limits: caps and thresholds. Those on hypotheses hold for each factor.
         max_split_error: of a factored_glmb: L1 error, of densities that each integrate to 1, up to which labels that
-            interacted are treated as independent again, and versions of a label as one; 2: always, as an LMB; 0: only
+            interacted are treated as independent again, and versions of a label as one. 2: always, as an LMB. 0: only
             if they are. At each measurement the weakest associations of factors are cut while the sum over pairs of
-            their products is at most this, and at most .01; see `scans_together`.
+            their products is at most this, and at most .01. See `scans_together`.
         max_factor_labels: of a factored_glmb: largest number of labels of a factor, and a quarter of the largest number
-            updated jointly at a scan; if more labels interact, factors are linked from the strongest association on,
+            updated jointly at a scan. If more labels interact, factors are linked from the strongest association on,
             and links that would join more are left out. `FilterInfo.independence_error_bound` bounds the error.
         scans_together: number of scans of one time that update one belief, of this sensor and others, as with
             `ParallelUpdate`. The error of a weak link that is cut counts once for each: for S scans the cutting
             threshold is S^2 times smaller.
         births: of a factored_glmb: poisson: targets that were never detected are a Poisson intensity, and a label
-            begins with a first detection, except at sites with an existence of .15 or more; labelled: a label begins at
+            begins with a first detection, except at sites with an existence of .15 or more. labelled: a label begins at
             each birth site at each scan. Filters whose beliefs are fused by label have labelled births, whatever this
             value is.
 
@@ -246,7 +246,7 @@ class SequentialFactoredFilter(_FactoredFilterBase, SequentialUpdate[FactoredGLM
     def _updated_in_view(
         self, prior: _Before, settled: Bools, step: SensorStep
     ) -> tuple[_Before, FactoredReport, Bools]:
-        """Return `_run_kernel` of the factors that the scan may affect; the other factors come first, unchanged."""
+        """Return `_run_kernel` of the factors that the scan may affect. The other factors come first, unchanged."""
         scan, _, sensor, truncation = step.inputs
         density, marks = (
             FactoredGLMB.from_kernel(prior.density),
@@ -276,7 +276,7 @@ def _factoring(max_split_error: float, max_factor_labels: int, num_scans: int, m
 
 
 def with_labelled_births(local: Any) -> Any:
-    """Return the filter with a label at each birth site, for beliefs that are fused by label; other filters unchanged.
+    """Return the filter with a label at each birth site, for beliefs that are fused by label, other filters unchanged.
 
     Otherwise the first detections of one target by two sensors would be two labels.
     """

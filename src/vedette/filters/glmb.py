@@ -80,7 +80,7 @@ class _GlmbFilterBase(LabelledFilterBase[GLMB]):
 
 
 def _sources(reports: Sequence[StepReport], repeats: Sequence[Ints]) -> Ints | None:
-    """Return the sources of tracks as in `TrackTable`; None after several sequential updates."""
+    """Return the sources of tracks as in `TrackTable`, or None after several sequential updates."""
     if len(reports) > 1:
         return None
     sources = reports[0].sources
@@ -94,9 +94,9 @@ def _sources(reports: Sequence[StepReport], repeats: Sequence[Ints]) -> Ints | N
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
 class DeltaGlmbFilter(_GlmbFilterBase, LabelledFilter[GLMB]):
-    """delta-GLMB filter of one sensor (Vo, Vo, Hoang 2017; paper, Algorithm 1, local prediction and update).
+    """delta-GLMB filter of one sensor (Vo, Vo, Hoang 2017, paper, Algorithm 1, local prediction and update).
 
-    Separate predictions and updates are ranked, whatever `assignment`; `limits` truncates a prediction as it does a
+    Separate predictions and updates are ranked, whatever `assignment`. `limits` truncates a prediction as it does a
     posterior.
 
     Attributes:
@@ -106,7 +106,7 @@ class DeltaGlmbFilter(_GlmbFilterBase, LabelledFilter[GLMB]):
         assignment: how joint associations are found: `RankedAssignment`, the heaviest in exact order, or drawn,
             `Gibbs`.
         marginalised: reduce the posterior to one hypothesis per label set after each step (M-delta-GLMB filter,
-            Fantacci and Vo 2015); track mixtures are then reduced to `limits.max_components`.
+            Fantacci and Vo 2015). Track mixtures are then reduced to `limits.max_components`.
 
     Raises:
         InputError: a part of another kind, or a field out of range.
@@ -145,7 +145,7 @@ class MultiSensorGlmbFilter(_GlmbFilterBase, SequentialUpdate[GLMB]):
 
     Attributes:
         targets: motion, survival and birth models.
-        sensors: model of each sensor; they may measure different quantities.
+        sensors: model of each sensor. They may measure different quantities.
         limits: caps and thresholds.
         marginalised: reduce the posterior to one hypothesis per label set after each step, as in `DeltaGlmbFilter`.
 

@@ -44,7 +44,7 @@ def check_scan(scan: Any, sensor: SensorModel, num_classes: int) -> tuple[Floats
 
     Raises:
         InputError: not an array of that shape, a value that is not finite, or an angle beyond a full turn either way,
-            which has other units. A scan without measurements is an empty array; None is refused, since a sensor
+            which has other units. A scan without measurements is an empty array. None is refused, since a sensor
             that did not scan must not be updated at all.
     """
     measurement, meas_dim = sensor.measurement, sensor.meas_dim
@@ -120,7 +120,7 @@ def births_for(
     """Return the birth density for a step of `dt` seconds in kernel form: `births`, or the model's birth sites if None.
 
     Raises:
-        InputError: a step below 1; births of another kind or dimension; a belief with labels of that step or later
+        InputError: a step below 1, births of another kind or dimension, or a belief with labels of that step or later
             ones, which the labels of the births could repeat.
     """
     number = step_number(step)
@@ -144,7 +144,7 @@ def check_new(belief: LabelledDensity, first: int, step: Any) -> None:
 
 
 def is_zero_duration(dt: Any) -> bool:
-    """Return True if `dt` is the number 0; other types are rejected where they are used."""
+    """Return True if `dt` is the number 0. Other types are rejected where they are used."""
     return not isinstance(dt, bool) and isinstance(dt, Real) and dt == 0.0
 
 

@@ -1,4 +1,4 @@
-"""Caps and thresholds of the filters; each is a named field of `Limits`."""
+"""Caps and thresholds of the filters. Each is a named field of `Limits`."""
 
 from __future__ import annotations
 
@@ -41,34 +41,34 @@ class Limits:
     """Caps and thresholds of the filters. `Limits.none()` switches them all off (for small exact problems).
 
     Attributes:
-        max_hypotheses: largest number of hypotheses, for a factored density in each factor; for an LMB, of joint
+        max_hypotheses: largest number of hypotheses, for a factored density in each factor, and for an LMB, of joint
             choices summed in a cluster too large for the exact sum.
         min_relative_weight: hypotheses lighter than this times the heaviest are dropped (if a labelled birth is weaker
-            than this, those below a tenth of the weakest birth); in a CPHD filter the large numbers of targets less
+            than this, those below a tenth of the weakest birth), and in a CPHD filter the large numbers of targets less
             probable than this times the most probable.
         min_track_weight: for every label and each association with the scan (missed, or detected as a given
             measurement), the heaviest such hypothesis is kept, in up to half of `max_hypotheses`, while its weight is
-            at least this times the heaviest of all; 1 switches this off. Without it, a target whose first measurements
+            at least this times the heaviest of all. 1 switches this off. Without it, a target whose first measurements
             fit its birth badly is displaced by variations of the heaviest hypotheses, and lost for good.
-        gate_probability: probability that a target's measurement falls inside its gate; 1 switches gating off.
+        gate_probability: probability that a target's measurement falls inside its gate. 1 switches gating off.
         min_log_clutter: floor of the log clutter intensity. A measurement where the clutter model gives intensity 0
             (outside the region) would otherwise rule out every hypothesis that leaves it unexplained.
         max_search_nodes: bound on the ranking search, a safeguard for scenes of extreme ambiguity.
         min_component_weight: mixture components lighter than this share of their track, or of the intensity of a PHD
             or CPHD filter, are dropped.
-        merge_distance: Mahalanobis distance within which components of a track are merged; 0 merges none.
-        max_components: largest number of components per track; 1 keeps one moment-matched Gaussian.
+        merge_distance: Mahalanobis distance within which components of a track are merged. 0 merges none.
+        max_components: largest number of components per track. 1 keeps one moment-matched Gaussian.
         min_existence: labels of an LMB or alone in their factor, or Bernoullis, less probable than this are dropped. If
             undetected targets are an intensity, only if a detection at their place is more probably of an undetected
-            target; if a labelled birth is weaker than this, only below a tenth of the weakest birth. Such labels have
+            target. If a labelled birth is weaker than this, only below a tenth of the weakest birth. Such labels have
             no effect on what later detections mean.
-        max_labels: largest number of labels of an LMB or a factored density, or of Bernoullis of a multi-Bernoulli; the
+        max_labels: largest number of labels of an LMB or a factored density, or of Bernoullis of a multi-Bernoulli. The
             most probable ones are kept.
         max_position_std: labels whose position std exceeds this along both axes are dropped after the scan: targets
-            without detections for a long time; infinite, in a file none: never [m].
+            without detections for a long time. Infinite, in a file none: never [m].
         max_intensity_components: largest number of components of the intensity of a PHD or CPHD filter, over all
             targets.
-        max_existence: upper bound on the existence of Bernoullis of the CB-MeMBer filter; below 1, because the update
+        max_existence: upper bound on the existence of Bernoullis of the CB-MeMBer filter, below 1, because the update
             weights them by r / (1 - r), and leaves a certain one unchanged, whatever the scan.
 
     Raises:

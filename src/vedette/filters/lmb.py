@@ -94,7 +94,7 @@ class SequentialLmbFilter(LmbFilterBase, SequentialUpdate[LMB]):
 
     After each scan the posterior is projected to an LMB again, so the order of the sensors matters a little. In return
     the cost grows in proportion to the number of sensors, whatever their fields of view, while that of
-    `MultiSensorLmbFilter` grows exponentially; the cost of a scan depends on the labels that it may affect, not on all
+    `MultiSensorLmbFilter` grows exponentially. The cost of a scan depends on the labels that it may affect, not on all
     labels. With one sensor it is the `LmbFilter`. Labels are dropped, by `Limits.min_existence`, `max_labels` and
     `max_position_std`, only after the last scan, so that a missed detection of one sensor does not lose a target that
     the next one detects. Truncation is counted as by `MultiSensorLmbFilter`.
@@ -115,7 +115,7 @@ class SequentialLmbFilter(LmbFilterBase, SequentialUpdate[LMB]):
         return step_lmb(prior, *step.inputs, step.limits.reduction(), association)
 
     def _updated_in_view(self, prior: Lmb, settled: Bools, step: SensorStep) -> tuple[Lmb, LmbReport, Bools]:
-        """Return `_run_kernel` of the labels that the scan may affect; settled: see `merge_updated`, empty if none."""
+        """Return `_run_kernel` of the labels that the scan may affect. settled: see `merge_updated`, empty if none."""
         scan, _, sensor, truncation = step.inputs
         marks = in_view(prior.tracks, scan, sensor, truncation)
         updated, report = self._run_kernel(marked(prior, marks), step)
@@ -132,5 +132,5 @@ def _by_combinations(prior: Lmb, step: SensorStep) -> tuple[Lmb, LmbReport]:
 
 
 def association_of(tracker: Filter) -> Association | None:
-    """Return the kernel form of a filter's association marginals; None for sums over clusters and other filters."""
+    """Return the kernel form of a filter's association marginals, or None for sums over clusters and other filters."""
     return tracker.assignment.to_kernel() if isinstance(tracker, LmbFilter) else None

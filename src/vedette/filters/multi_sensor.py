@@ -61,7 +61,7 @@ class MultiSensorFilter(LabelledFilterBase[BeliefT]):
 
     Attributes:
         targets: motion, survival and birth models.
-        sensors: model of each sensor; they may measure different quantities.
+        sensors: model of each sensor. They may measure different quantities.
         limits: caps and thresholds.
 
     Raises:
@@ -100,12 +100,12 @@ class MultiSensorFilter(LabelledFilterBase[BeliefT]):
 
         Args:
             belief: posterior of the previous step.
-            scans: one per sensor, in their order: (num, meas_dim) measurements in any order; angles in radians, in
-                (-pi, pi]; None for a sensor that did not scan.
+            scans: one per sensor, in their order: (num, meas_dim) measurements in any order, with angles in radians, in
+                (-pi, pi]. None for a sensor that did not scan.
             poses: one per sensor: [px, py, heading_rad, ...].
-            dt: seconds since the previous step; 0: no motion, deaths or births.
-            step: number of this step, from 1 on; births are labelled with it.
-            rng: not used; accepted so that filters are interchangeable.
+            dt: seconds since the previous step. 0: no motion, deaths or births.
+            step: number of this step, from 1 on. Births are labelled with it.
+            rng: not used, but accepted so that filters are interchangeable.
             births: as in `DeltaGlmbFilter.step`.
 
         Returns:
@@ -128,7 +128,7 @@ class MultiSensorFilter(LabelledFilterBase[BeliefT]):
         return self._updated(self._before_scan(prior, period, step, births), born, taken, period, f"step {step}")
 
     def _motion(self, dt: float) -> Motion | None:
-        """Return the motion in kernel form; None for scans at the time of the belief."""
+        """Return the motion in kernel form, or None for scans at the time of the belief."""
         return kernel_motion(self.targets.motion, self.targets.survival) if dt > 0.0 else None
 
     @abstractmethod
@@ -189,5 +189,5 @@ class SequentialUpdate(MultiSensorFilter[BeliefT]):
         """Return the posterior and report in kernel form."""
 
     def _updated_in_view(self, prior: Any, settled: Bools, step: SensorStep) -> tuple[Any, Any, Bools]:
-        """Return `_run_kernel`; subclasses may skip unaffected parts. settled: result of the previous call."""
+        """Return `_run_kernel`. Subclasses may skip unaffected parts. settled: result of the previous call."""
         return (*self._run_kernel(prior, step), settled)

@@ -24,14 +24,14 @@ class MultiSensorLmbFilter(LmbFilterBase, MultiSensorFilter[LMB]):
     """LMB filter of several sensors: the existences and densities of the exact posterior given all scans of a time.
 
     Every track is weighted under each combination of a miss or a gated measurement at every sensor, and the
-    combinations of all tracks are summed jointly, without using a measurement twice; the posterior is projected to an
+    combinations of all tracks are summed jointly, without using a measurement twice. The posterior is projected to an
     LMB once, not after each sensor. The order of the sensors does not matter if models are linear and neither noise nor
     detection depends on the state. Otherwise the model of a later sensor is linearised, and its noise and detection are
     evaluated, at the result of the earlier ones.
 
     `limits` truncates, and the report counts: combinations of a track that are surely less probable than
-    `min_existence`, or beyond the `max_hypotheses` heaviest at a sensor (`search_truncated`; counted by their weight
-    there, before later sensors); and, in a cluster of tracks that compete for many measurements, sets of taken
+    `min_existence`, or beyond the `max_hypotheses` heaviest at a sensor (`search_truncated`, counted by their weight
+    there, before later sensors), and, in a cluster of tracks that compete for many measurements, sets of taken
     measurements beyond the `max_hypotheses` heaviest, or lighter than `min_relative_weight` times the heaviest
     (`num_inexact_clusters`). All of it is in `truncation_error_bound`. The number of combinations grows exponentially
     with the number of sensors that observe a track, up to `max_hypotheses`.

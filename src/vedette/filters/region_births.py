@@ -40,7 +40,7 @@ class RegionBirths(NamedTuple):
 
 @lru_cache(maxsize=100)
 def region_births(birth: BirthModel) -> RegionBirths | None:
-    """Return the cells of targets that appear anywhere; None if the births have no region."""
+    """Return the cells of targets that appear anywhere, or None if the births have no region."""
     measured, model, nodes = birth.from_measurements, birth.anywhere, _NODES_OF_CHOSEN
     if model is None:
         model, nodes = None if measured is None else measured.uniform(), _NODES
@@ -62,7 +62,7 @@ def no_cells(state_dim: int) -> Cells:
 
 
 def tables_of(undetected: UndetectedTargets) -> Floats:
-    """Expected numbers in the cells, shape (num_tables, num_cells); a learnt birth rate adds a table per unit rate."""
+    """Expected numbers in the cells, shape (num_tables, num_cells). A learnt birth rate adds a table per unit rate."""
     if undetected.cells is None:
         return np.empty((0, 0))
     expected, learnt = for_kernel(undetected.cells.expected), undetected.birth_rate
@@ -115,7 +115,7 @@ def arrivals_of(
 ) -> Arrivals:
     """Return the kernel input for the prediction of undetected targets over `dt` seconds.
 
-    born: intensity of births at sites; most: largest number of components; appear: whether the region has births in
+    born: intensity of births at sites. most: largest number of components. appear: whether the region has births in
     this period. Cells that the first prediction adds do not change (`with_cells`).
     """
     birth, places = targets.birth, region_births(targets.birth)
@@ -138,7 +138,7 @@ def without_change(born: Mixture, most: int) -> Arrivals:
 
 
 def rate_after(learnt: LearntRate, left: Left, label: tuple[int, int]) -> LearntRate:
-    """Return the learnt birth rate after a scan. left: from its kernel; label: of its first measurement."""
+    """Return the learnt birth rate after a scan. left: from its kernel. label: of its first measurement."""
     num = len(left.born_shares)
     labels = np.column_stack([np.full(num, label[0]), label[1] + np.arange(num)])
     return replace(

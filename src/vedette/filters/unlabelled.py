@@ -39,9 +39,9 @@ class UnlabelledFilter(SingleSensorFilter, ABC, Generic[_Density]):
     def step(
         self, belief: _Density, scan: Any, pose: Any, dt: float, step: int, *, rng: np.random.Generator
     ) -> tuple[_Density, FilterInfo]:
-        """Predict over `dt` seconds and update with a scan; arguments, results and errors as `DeltaGlmbFilter.step`.
+        """Predict over `dt` seconds and update with a scan, arguments, results and errors as `DeltaGlmbFilter.step`.
 
-        `rng` is not used; it is accepted so that filters are interchangeable.
+        `rng` is not used. It is accepted so that filters are interchangeable.
         """
         generator(rng)
         measurements, repeats = check_scan(scan, self.sensor, self.targets.num_classes)
@@ -75,7 +75,7 @@ class UnlabelledFilter(SingleSensorFilter, ABC, Generic[_Density]):
 class PhdFilter(UnlabelledFilter[Poisson]):
     """Gaussian-mixture PHD filter of one sensor (Vo and Ma 2006).
 
-    The belief is a Poisson density; its intensity after a scan is that of the exact posterior of such a prior. Births
+    The belief is a Poisson density. Its intensity after a scan is that of the exact posterior of such a prior. Births
     enter with their intensity, the existence of each site times its density, which is exact as well.
 
     Attributes and errors: as `LmbFilter`.
@@ -94,7 +94,7 @@ class PhdFilter(UnlabelledFilter[Poisson]):
 class CphdFilter(UnlabelledFilter[IidCluster]):
     """Gaussian-mixture CPHD filter of one sensor (Vo, Vo and Cantoni 2007).
 
-    The belief is an iid cluster; its cardinality distribution and intensity after a scan are those of the exact
+    The belief is an iid cluster. Its cardinality distribution and intensity after a scan are those of the exact
     posterior of such a prior. The cardinality distribution of the births is that of the multi-Bernoulli birth (not a
     Poisson one of the same mean), so that the predicted cardinality distribution is exact too.
 
@@ -119,9 +119,9 @@ class CphdFilter(UnlabelledFilter[IidCluster]):
 class CbMemberFilter(UnlabelledFilter[MultiBernoulli]):
     """Gaussian-mixture cardinality-balanced multi-target multi-Bernoulli filter (Vo, Vo and Cantoni 2009).
 
-    The belief is a multi-Bernoulli density, to which the births are added unchanged; prediction is exact. The update
+    The belief is a multi-Bernoulli density, to which the births are added unchanged. Prediction is exact. The update
     approximates the posterior by a Bernoulli for each missed one and for each measurement. It assumes that detection is
-    probable and clutter not too dense; then the expected number of targets is unbiased, unlike in Mahler's original
+    probable and clutter not too dense. Then the expected number of targets is unbiased, unlike in Mahler's original
     multi-Bernoulli update.
 
     Attributes and errors: as `LmbFilter`.

@@ -17,7 +17,7 @@ from vedette.kernels.base.types import Floats, Ints
 def align_factors(beliefs: Sequence[FactoredGLMB], max_products: int) -> tuple[list[FactoredGLMB], Floats]:
     """Return the beliefs with one factor for each of the smallest groups of labels that no factor crosses.
 
-    Factor g of each belief holds labels of group g alone; if a belief has none of them, its factor g is certain of no
+    Factor g of each belief holds labels of group g alone. If a belief has none of them, its factor g is certain of no
     target. Several factors of a belief in one group become the heaviest `max_products` of their products. Hypotheses of
     weight zero are left out. Also returns the log of the product of the retained weights, shape (num_groups,).
     """
@@ -31,7 +31,7 @@ def align_factors(beliefs: Sequence[FactoredGLMB], max_products: int) -> tuple[l
 
 
 def _one_a_group(belief: FactoredGLMB, groups: Ints, num_groups: int, max_products: int) -> tuple[FactoredGLMB, Floats]:
-    """Return one factor for each group, and the logs of the retained weights; groups: of each factor, or -1."""
+    """Return one factor for each group, and the logs of the retained weights. groups: of each factor, or -1."""
     order, log_kept = np.argsort(groups, kind="stable"), np.zeros(num_groups)
     ends = np.searchsorted(groups[order], np.arange(num_groups + 1))
     counts = np.diff(ends)
@@ -50,7 +50,7 @@ def _one_a_group(belief: FactoredGLMB, groups: Ints, num_groups: int, max_produc
 
 
 def sort_factors(marginalised: FactoredGLMB) -> FactoredGLMB:
-    """Return the factors in the order of their first labels; those of one label in the form of `FactoredGLMB.of`.
+    """Return the factors in the order of their first labels, with those of one label in the form of `FactoredGLMB.of`.
 
     marginalised: each hypothesis must have its own tracks. Factors without tracks are dropped.
     """

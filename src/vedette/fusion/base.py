@@ -30,7 +30,7 @@ class FusionInfo:
 
     Attributes:
         missing_sets: for each sensor, number of label sets that another sensor has and this one lacks, so that a floor
-            replaced their weight; for LMBs, number of labels whose existence was replaced by a floor. 0 for a sensor
+            replaced their weight, or for LMBs, number of labels whose existence was replaced by a floor. 0 for a sensor
             of weight 0, which takes no part.
         missing_labels: for each sensor, number of labels that it lacks altogether, so that its density was left out of
             their fused density.
@@ -41,7 +41,7 @@ class FusionInfo:
         empty_intersection: True if no label set (LMB: no label) is common to all sensors. False if there is none at
             all.
         log_normaliser: log of the set integral of the product of the powers. It is at most 0, apart from the effect of
-            floors and of the inflation of component-wise powers; far below 0 the sensors contradict each other.
+            floors and of the inflation of component-wise powers. Far below 0 the sensors contradict each other.
         discarded_weight: probability of the fused label sets beyond the cap.
     """
 
@@ -71,8 +71,8 @@ class Fusion(Protocol):
     def fuse(self, beliefs: Sequence[Any], views: FieldsOfView | None = None) -> tuple[Any, FusionInfo]:
         """Return the fused density and the report of the fusion.
 
-        views: fields of view of the sensors, and the density that they were updated from; None if not known, as in the
-        decisions of a planner.
+        views: fields of view of the sensors, and the density that they were updated from, or None if not known, as in
+        the decisions of a planner.
         """
         ...
 
@@ -107,7 +107,7 @@ class LogLinearPool(NamedTuple):
 
     In proportion to pi+^prior_power prod_s pi_s^(powers_s).
 
-    prior_power: of the common prediction; not 0 if the sensors' beliefs must be updated from one. powers: one per
+    prior_power: of the common prediction. Not 0 if the sensors' beliefs must be updated from one. powers: one per
     sensor. missing_existence: replaces the existence of a label that a sensor lacks.
     """
 
@@ -121,7 +121,7 @@ class LogLinearFusion(Protocol):
     """A fusion that a planner can evaluate by summing the contributions of the sensors to each label."""
 
     def log_linear_pool(self, num_sensors: int) -> LogLinearPool | None:
-        """Return the pool for `num_sensors` sensors and single Gaussians; None if the fusion is not log-linear."""
+        """Return the pool for `num_sensors` sensors and single Gaussians, or None if the fusion is not log-linear."""
         ...
 
 
@@ -135,7 +135,7 @@ class PrevalidatedBeliefs(tuple[Any, ...]):
 
 
 def all_valid(beliefs: Sequence[Any]) -> bool:
-    """Return True if all beliefs are valid LMBs of the same states and classes; fast, without reporting faults."""
+    """Return True if all beliefs are valid LMBs of the same states and classes, fast, without reporting faults."""
     if not beliefs or not all(isinstance(belief, LabelledDensity) and belief.is_lmb for belief in beliefs):
         return False
     if not all(map(_has_kernel_arrays, beliefs)) or len(set(map(_sizes, beliefs))) > 1:
@@ -206,7 +206,7 @@ def count_lost(existence: Floats, fused: Floats) -> int:
 
 
 def per_sensor_counts(counts: Ints, active: Sequence[int], num_sensors: int) -> tuple[int, ...]:
-    """Return one number per sensor, from the numbers of the active sensors; 0 for the others."""
+    """Return one number per sensor, from the numbers of the active sensors, with 0 for the others."""
     numbers = np.zeros(num_sensors, np.int64)
     numbers[list(active)] = counts
     return tuple(numbers.tolist())

@@ -21,7 +21,7 @@ def updated_classes(prior: Floats, gains: Floats) -> tuple[Floats, Floats]:
 
     Classes of a mixture are taken as independent of its states.
 
-    prior, gains: (num, num_classes); without classes the factors are 1.
+    prior, gains: (num, num_classes). Without classes the factors are 1.
     """
     if prior.shape[1] == 0:
         return prior.copy(), np.zeros(len(prior))

@@ -29,7 +29,7 @@ _Glmb = TypeVar("_Glmb", GLMB, FactoredGLMB)
 
 @dataclass(frozen=True, slots=True)
 class CmDeltaGlmb:
-    """Consensus marginalised delta-GLMB fusion (paper eq. 11; Fantacci et al. 2015): GCI by label set and label.
+    """Consensus marginalised delta-GLMB fusion (paper eq. 11, Fantacci et al. 2015): GCI by label set and label.
 
     The fused label sets are those that any sensor of positive weight has, not only those common to all sensors, because
     a set may be missing through a cap as well as through evidence against it. If a sensor lacks a set, a floor replaces
@@ -43,14 +43,14 @@ class CmDeltaGlmb:
     position.
 
     Attributes:
-        weights: fusion weights, one per sensor, in the order of the beliefs; non-negative, sum 1. A sensor of weight 0
+        weights: fusion weights, one per sensor, in the order of the beliefs, non-negative, sum 1. A sensor of weight 0
             takes no part.
         mixture_power: how the power of a mixture is computed. "moment_matched": as the power of the Gaussian with the
-            mean and covariance of each mixture, as in the M-delta-GLMB; exact for single Gaussians. "component_wise":
-            as the mixture of all products of component powers; valid for well separated components, an upper bound of
+            mean and covariance of each mixture, as in the M-delta-GLMB, exact for single Gaussians. "component_wise":
+            as the mixture of all products of component powers, valid for well separated components, an upper bound of
             the integral otherwise. "quadrature": the same with each Gaussian's mass and moments corrected by cubature.
             "auto": component-wise, with the number of components reduced until the number of combinations over all
-            sensors is within `limits.max_combinations`; a single component is the same as moment matching.
+            sensors is within `limits.max_combinations`. A single component is the same as moment matching.
             docs/decisions/0003-power-of-mixtures.md has their errors.
         missing_log_weight: log of the floor for the weight of a label set that a sensor lacks.
         limits: caps on the cost.
@@ -74,8 +74,8 @@ class CmDeltaGlmb:
 
         The sensors' GLMBs may be delta or marginalised. Label sets of equal weight are in the order of their first
         occurrence. For products of GLMBs (a GLMB has a single factor), the result is the product of the fusions of each
-        group of labels; groups are the smallest that no sensor's factor crosses. A sensor without a label of a group is
-        certain that the group is empty. The caps apply to each group; `max_hypotheses` also applies to each sensor's
+        group of labels. Groups are the smallest that no sensor's factor crosses. A sensor without a label of a group is
+        certain that the group is empty. The caps apply to each group. `max_hypotheses` also applies to each sensor's
         products of factors in it. views: not used. Raises `InputError` for a wrong number or kind of beliefs, state
         dimensions that differ or an invalid density, and `NumericalError` if a product of track densities cannot be
         integrated.
@@ -115,7 +115,7 @@ class CmDeltaGlmb:
         )
 
     def precompute(self, cases: Sequence[DensityBatch], prediction: LabelledDensity) -> PowerProducts | None:
-        """Return the fusions of all combinations of cases; None for an LMB prediction, or if the powers are not exact.
+        """Return the fusions of all combinations of cases, or None for an LMB prediction or inexact powers.
 
         cases: one batch per sensor. prediction: marginalised, with one Gaussian per track. Floors and substitutes are
         as in `fuse`, except that under `auto` the substitutes are single Gaussians. Raises `InputError` for a wrong

@@ -41,7 +41,7 @@ from vedette.models.arguments import chance, flag
 
 @dataclass(frozen=True, slots=True)
 class Clmb:
-    """Consensus LMB fusion (paper eq. 12; Fantacci et al. 2015): GCI label by label.
+    """Consensus LMB fusion (paper eq. 12, Fantacci et al. 2015): GCI label by label.
 
     The logit of a fused existence is the weighted mean of the sensors' logits plus the log of the integral of prod_i
     p_i^(w_i), which is at most 0. One blind sensor therefore lowers the existence of a target (0.98 and 0.1 give about
@@ -50,26 +50,26 @@ class Clmb:
     The fused labels are those that any sensor of positive weight has. If a sensor lacks a label (or has it with
     existence 0), a floor replaces its existence: the least of `missing_existence` and the existences that the sensor
     has. The sensor is then left out of the label's density, and the weights of the other sensors are scaled to sum to
-    one; `FusionInfo` counts this. A label in every hypothesis of a sensor's GLMB is certain there, and so in the
-    fusion. (Truncation may have removed the other hypotheses; a bound on its certainty, like the floor on its absence,
+    one. `FusionInfo` counts this. A label in every hypothesis of a sensor's GLMB is certain there, and so in the
+    fusion. (Truncation may have removed the other hypotheses. A bound on its certainty, like the floor on its absence,
     makes joint decisions worse, not better.)
 
     Plain weights assume that the sensors have the same field of view: a target that one sensor surely observes is lost
     if another sensor does not observe its position. With `field_of_view_weighting`, the weights at a label are w_sl
     proportional to w_s P / (1 - .999 P), where P = E[P_D^s(l)], that is, to the information that a scan has about the
     existence of a target that is present. A sensor that cannot observe the position of a target (or did not scan) then
-    affects neither its existence nor its density; a sensor that observes the position and lacks the label contributes
+    affects neither its existence nor its density. A sensor that observes the position and lacks the label contributes
     its floor. If no sensor that scanned observes a label, sensors are weighted by how well they would observe it if
-    they scanned; if no sensor would, those that have the label keep their plain weights. In both modes a target must
+    they scanned. If no sensor would, those that have the label keep their plain weights. In both modes a target must
     have one label at all sensors (see `match_labels`).
 
     Attributes:
-        weights: fusion weights, one per sensor, in the order of the beliefs; non-negative, sum 1. A sensor of weight 0
+        weights: fusion weights, one per sensor, in the order of the beliefs, non-negative, sum 1. A sensor of weight 0
             takes no part.
-        mixture_power: how the power of a mixture is computed; see `CmDeltaGlmb`.
+        mixture_power: how the power of a mixture is computed. See `CmDeltaGlmb`.
         missing_existence: floor for the existence probability of a label that a sensor lacks, in (0, 1).
         limits: caps on the cost.
-        field_of_view_weighting: whether sensors are weighted by how well they observe each label; `fuse` then needs
+        field_of_view_weighting: whether sensors are weighted by how well they observe each label. `fuse` then needs
             `views`.
 
     Raises `InputError` for invalid weights, floor or limits.
@@ -90,7 +90,7 @@ class Clmb:
     def fuse(self, beliefs: Sequence[LabelledDensity], views: FieldsOfView | None = None) -> tuple[LMB, FusionInfo]:
         """Return the fused LMB in increasing label order, and the report. Beliefs that are not LMBs are converted.
 
-        views: fields of view of the sensors; not used with plain weights. Raises `InputError` for a wrong number or
+        views: fields of view of the sensors, not used with plain weights. Raises `InputError` for a wrong number or
         kind of beliefs, state dimensions that differ, an invalid density or missing views, and `NumericalError` if a
         product of track densities cannot be integrated.
         """
@@ -112,7 +112,7 @@ class Clmb:
         return unchecked(LMB, TrackTable.from_kernel(tracks), logits), info
 
     def log_linear_pool(self, num_sensors: int) -> LogLinearPool | None:
-        """Return the pool with these weights; None with `field_of_view_weighting`."""
+        """Return the pool with these weights, or None with `field_of_view_weighting`."""
         return None if self.field_of_view_weighting else LogLinearPool(0.0, tuple(self.weights), self.missing_existence)
 
     def precompute(self, cases: Sequence[DensityBatch], prediction: LabelledDensity) -> PowerProducts | None:
@@ -120,7 +120,7 @@ class Clmb:
 
         None with `field_of_view_weighting`, a GLMB prediction or inexact powers.
 
-        cases: one batch per sensor; a GLMB is converted first, as in `fuse`. prediction: with one Gaussian per track.
+        cases: one batch per sensor. A GLMB is converted first, as in `fuse`. prediction: with one Gaussian per track.
         Raises `InputError` for a wrong number of cases.
         """
         check_kinds([own.kind for own in cases], (LMB, GLMB), len(self.weights))
@@ -163,7 +163,7 @@ class _Powers(NamedTuple):
         return cls(shares, of_tracks, np.where(bare, aligned.chosen, chosen), shares > 0.0)
 
     def mean(self, values: Floats) -> Floats:
-        """Weighted mean over sensors, shape (num_labels,); values of sensors left out may be infinite."""
+        """Weighted mean over sensors, shape (num_labels,). Values of sensors left out may be infinite."""
         if self.of_labels.ndim == 1:
             return np.asarray(values @ self.of_labels)
         return sum_over_sensors(self.of_labels * np.where(self.participating, values, 0.0))
@@ -189,11 +189,11 @@ class ArithmeticAverage:
     `match_labels`).
 
     Attributes:
-        weights: one per sensor, in the order of the beliefs; non-negative, sum 1. A sensor of weight 0 takes no part.
-        field_of_view_weighting: whether sensors are weighted by how well they observe each label; `fuse` then needs
+        weights: one per sensor, in the order of the beliefs, non-negative, sum 1. A sensor of weight 0 takes no part.
+        field_of_view_weighting: whether sensors are weighted by how well they observe each label. `fuse` then needs
             `views`.
         limits: caps on the fused mixtures (`log_min_component_weight`, `merge_distance`, None for 2,
-            `max_components`); the others are not used.
+            `max_components`). The others are not used.
 
     Raises `InputError` for invalid weights or limits.
     """
@@ -210,7 +210,7 @@ class ArithmeticAverage:
     def fuse(self, beliefs: Sequence[LabelledDensity], views: FieldsOfView | None = None) -> tuple[LMB, FusionInfo]:
         """Return the fused LMB in increasing label order, and the report. Beliefs that are not LMBs are converted.
 
-        views: fields of view of the sensors; not used with plain weights. Labels that only sensors without weight there
+        views: fields of view of the sensors, not used with plain weights. Labels that only sensors without weight there
         have are left out. Raises `InputError` for a wrong number or kind of beliefs, state dimensions that differ, an
         invalid density or missing views.
         """

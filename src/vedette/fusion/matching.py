@@ -49,7 +49,7 @@ def match_labels(
 
     The first sensor keeps its labels. The labels of each further sensor are assigned to those found so far, at the
     least sum of d'S^-1 d + log det S with S = P_a + P_b over the whole state, with one Gaussian per label. Labels that
-    are likely to exist are assigned first, then the others among the remaining ones; equal labels win ties. Only pairs
+    are likely to exist are assigned first, then the others among the remaining ones. Equal labels win ties. Only pairs
     with d'S^-1 d within the gate are assigned, as many as possible. An assigned label takes the label it is assigned
     to. An unassigned one keeps its own, unless that is in use: then it gets its birth step and a new index of this
     sensor, at least 1 000 000 (sensor + 1).
@@ -145,7 +145,7 @@ def _common_labels(own: _Targets, found: _Targets, pairs: dict[int, int], sensor
 
 
 def _joined(found: _Targets, own: _Targets) -> _Targets:
-    """Return all labels so far, each with the density of the sensor of largest existence; the first one on a tie."""
+    """Return all labels so far, each with the density of the sensor of largest existence, the first one on a tie."""
     place = {label: i for i, label in enumerate(found.labels)}
     new = [i for i, label in enumerate(own.labels) if label not in place]
     existence, means, covs = (
@@ -159,7 +159,7 @@ def _joined(found: _Targets, own: _Targets) -> _Targets:
 
 
 def relabelled(belief: LabelledDensity, names: dict[Label, Label]) -> LabelledDensity:
-    """Return the belief under other labels, all distinct; labels without a new name are kept."""
+    """Return the belief under other labels, all distinct. Labels without a new name are kept."""
     if all(old == new for old, new in names.items()):
         return belief
     # The track table of a GLMB may contain labels that no hypothesis uses.
@@ -191,7 +191,7 @@ class LabelMatchedFusion:
         chance("gate_probability", self.gate_probability)
 
     def match(self, beliefs: Sequence[LabelledDensity]) -> list[LabelledDensity]:
-        """Return the beliefs under common labels; ambiguous labels of products of GLMBs are resolved first.
+        """Return the beliefs under common labels. Ambiguous labels of products of GLMBs are resolved first.
 
         Otherwise, each of several candidate labels of one target would be matched as an improbable target.
         """

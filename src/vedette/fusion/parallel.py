@@ -59,24 +59,24 @@ class ParallelUpdate:
     For products of GLMBs the same holds for each label set I of a group of labels: w(I) is in proportion to w+(I)
     prod_s (w_s(I) / w+(I)) times the integrals of the position densities of its labels, where w_s(I) is the weight in a
     factor of sensor s and w+(I) the prediction's weight of I among the labels in that factor. If each sensor finds that
-    one of two labels has no target, the rule takes this as the same label at all sensors; LMBs would reduce both labels
+    one of two labels has no target, the rule takes this as the same label at all sensors. LMBs would reduce both labels
     at every sensor, and may lose both. A track that is a mixture contributes a sum of such terms. The product is then
     the mixture over all choices of one component per sensor, of which the Gaussian of the moments is kept. (If an
     exponent is not 1, the mixture of each posterior is first replaced by the Gaussian of its moments.)
 
-    The rule is exact for LMBs of single Gaussians and for label sets in which positions do not depend on each other;
-    otherwise it is as accurate as the moments.
+    The rule is exact for LMBs of single Gaussians and for label sets in which positions do not depend on each other.
+    Otherwise it is as accurate as the moments.
 
     Attributes:
-        weights: exponents v_s of (pi_s / pi+), non-negative, one per sensor; None for 1 each, which is Bayes' rule.
+        weights: exponents v_s of (pi_s / pi+), non-negative, one per sensor, or None for 1 each, which is Bayes' rule.
             Other values are for consensus, where they converge to 1.
         missing_existence: upper bound, in (0, 1), on the existence of a predicted label that a sensor's posterior lacks
-            because its filter dropped it. If the prediction was higher, the difference counts; the sensor then adds no
+            because its filter dropped it. If the prediction was higher, the difference counts. The sensor then adds no
             information about the position. Counted in `FusionInfo`. It should be the filters' `min_existence`, or
             `min_existence` should be 0, so that nothing is dropped.
         limits: caps on the cost: `max_combinations` of components of one label, the likeliest after each sensor
             (combinations lighter than 1e-6 of the likeliest are always dropped), and `max_hypotheses` label sets of a
-            group, predicted and fused; the others are not used.
+            group, predicted and fused. The others are not used.
 
     Raises `InputError` for invalid weights, floor or limits.
     """
@@ -105,10 +105,10 @@ class ParallelUpdate:
         """Return the fused density of the labels of the prediction, in increasing order, and the report.
 
         LMBs give an LMB. If a belief or the prediction is a `FactoredGLMB`, the result is a `FactoredGLMB` with one
-        Gaussian per label; its factors are the smallest groups of labels that no factor of the prediction or of a
+        Gaussian per label. Its factors are the smallest groups of labels that no factor of the prediction or of a
         posterior crosses.
 
-        beliefs: posteriors, whose labels the prediction must have. views: with the common `prediction`; a product of
+        beliefs: posteriors, whose labels the prediction must have. views: with the common `prediction`. A product of
         GLMBs must have one single Gaussian per label, the same in all hypotheses.
 
         Raises `InputError` for a missing or unsuitable prediction, a wrong number or kind of beliefs, state dimensions
@@ -134,7 +134,7 @@ class ParallelUpdate:
         return fused, info
 
     def _fused_lmbs(self, prediction: LMB, beliefs: Sequence[LMB], weights: Floats) -> tuple[LMB, FusionInfo]:
-        """Fuse label by label; the prediction must have single Gaussians."""
+        """Fuse label by label. The prediction must have single Gaussians."""
         prior, given = prediction.tracks.to_kernel(), posteriors_of(prediction, beliefs, self.missing_existence)
         before = prior.components
         updated, log_overlaps = self._updated_tracks(before, given.chosen, weights, given.tracks)

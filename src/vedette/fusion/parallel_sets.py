@@ -45,7 +45,7 @@ def posteriors_of(prediction: LMB, beliefs: Sequence[LMB], missing_existence: fl
 
 
 def known_places(prediction: Ints, posteriors: Sequence[Ints]) -> Ints:
-    """Place of each label of the prediction in each posterior, shape (num_labels, num_sensors); -1 if absent.
+    """Place of each label of the prediction in each posterior, shape (num_labels, num_sensors), or -1 if absent.
 
     Labels are in increasing order. Raises `InputError` if a posterior has a label that the prediction lacks.
     """
@@ -61,7 +61,7 @@ def known_places(prediction: Ints, posteriors: Sequence[Ints]) -> Ints:
 
 
 def updated_logs(prior: Floats, posteriors: Floats, weights: Floats) -> Floats:
-    """Return prior + sum_s v_s (posterior_s - prior); an infinite value that does not change contributes nothing."""
+    """Return prior + sum_s v_s (posterior_s - prior). An infinite value that does not change contributes nothing."""
     base = prior[:, None]
     with np.errstate(invalid="ignore"):
         change = np.where((posteriors == base) | (weights == 0.0), 0.0, posteriors - base)
@@ -81,7 +81,7 @@ def check_evidence(labels: Ints, logits: Floats) -> None:
 class GroupedSets(NamedTuple):
     """Label sets of one group, with the change of their weights by the scans, and the fused positions of their targets.
 
-    A place is a label together with the track of each sensor for it; in most sets a label has the same place.
+    A place is a label together with the track of each sensor for it. In most sets a label has the same place.
     """
 
     labels: Ints  # (num_labels, 2) increasing

@@ -32,11 +32,11 @@ class FusionLimits(NamedTuple):
 
     Attributes:
         log_min_component_weight: log of the weight below which components of a track's mixture are dropped before it is
-            raised to a power and after the fusion; unused when moment matched.
-        merge_distance: components within this Mahalanobis distance are merged at the same times; none: 2 for
+            raised to a power and after the fusion, unused when moment matched.
+        merge_distance: components within this Mahalanobis distance are merged at the same times. none: 2 for
             component_wise, 0.5 for quadrature powers.
-        max_components: largest number of components of a track before its power is taken; unused when moment matched.
-        max_combinations: bound on the combinations of components of one label at all sensors, max_components^sensors;
+        max_components: largest number of components of a track before its power is taken, unused when moment matched.
+        max_combinations: bound on the combinations of components of one label at all sensors, max_components^sensors.
             `auto` reduces the number of components until it holds.
         max_hypotheses: largest number of label sets of the fused density.
     """
@@ -113,7 +113,7 @@ def fifth_degree_rule(dim: int) -> tuple[Floats, Floats]:
     The points are the centre, the corners of a regular simplex and of its opposite, and the midpoints of their edges
     projected to the same sphere: dim^2 + 3 dim + 3 points (Lu and Darmofal 2004, "Higher-dimensional integration with
     Gaussian weight for applications in probabilistic design", after Mysovskikh). No weight is negative, so a covariance
-    computed with these points is never indefinite; for larger `dim` one weight would be negative.
+    computed with these points is never indefinite. For larger `dim` one weight would be negative.
     """
     corners = _simplex(dim)
     first, second = np.triu_indices(dim + 1, 1)

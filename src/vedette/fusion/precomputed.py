@@ -37,14 +37,14 @@ class SupportsPrecomputation(Protocol):
     def precompute(self, cases: Sequence[DensityBatch], prediction: GLMB | LMB) -> PrecomputedFusion | None:
         """Return the fusions of all combinations of the sensors' cases, or None if they cannot be precomputed.
 
-        cases: one batch per sensor. prediction: the density to compare with, with one Gaussian per track; a GLMB must
+        cases: one batch per sensor. prediction: the density to compare with, with one Gaussian per track. A GLMB must
         be marginalised. The result equals `fuse` of each combination, except for the scale.
         """
         ...
 
 
 def precompute_single_sensor(own: DensityBatch, prediction: GLMB | LMB) -> PowerProducts | None:
-    """Return the precomputed cases of a single sensor; None for LMB cases and a GLMB prediction.
+    """Return the precomputed cases of a single sensor, or None for LMB cases and a GLMB prediction.
 
     An LMB prediction is evaluated on the label sets of GLMB cases. Raises `InputError` for GLMBs without a common label
     set.
@@ -59,7 +59,7 @@ def precompute_single_sensor(own: DensityBatch, prediction: GLMB | LMB) -> Power
 def precompute_glmbs(
     shares: Sequence[SensorPower], prediction: DensityBatch, sensors: Sequence[int] | None = None
 ) -> PowerProducts | None:
-    """Return precomputed GLMB fusions; None if some combination may have no label set in common with the prediction.
+    """Return precomputed GLMB fusions, or None if some combination may have no label set in common with the prediction.
 
     Raises `InputError` if no combination has one.
     """
@@ -73,7 +73,7 @@ def precompute_glmbs(
 
 
 def _on_label_sets(lmb: LMB, own: DensityBatch) -> GLMB:
-    """Return the LMB's hypotheses on those label sets that it has; their weights do not sum to one.
+    """Return the LMB's hypotheses on those label sets that it has. Their weights do not sum to one.
 
     The existence of a certain or impossible label is clipped to almost 1 or 0. A divergence on common label sets does
     not depend on the scale of the weights, so it remains defined if the GLMB lacks that label in every set.

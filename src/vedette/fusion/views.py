@@ -30,8 +30,8 @@ class FieldsOfView:
     Attributes:
         sensors: sensor models, in the order of the beliefs.
         poses: (num_sensors, pose_dim) pose of each sensor.
-        scanned: whether each sensor scanned at this time; a sensor that did not scan detected nothing.
-        prediction: the belief that all sensors' beliefs were updated from, each by its own scan alone; None if there is
+        scanned: whether each sensor scanned at this time. A sensor that did not scan detected nothing.
+        prediction: the belief that all sensors' beliefs were updated from, each by its own scan alone. None if there is
             no such belief.
 
     Raises:
@@ -58,11 +58,11 @@ class FieldsOfView:
         return replace(self, scanned=(True,) * len(self.sensors))
 
     def detection(self, tracks: TrackTable) -> Floats:
-        """Mean probability of detection over each track's density, (num_tracks, num_sensors); 0 without a scan."""
+        """Mean probability of detection over each track's density, (num_tracks, num_sensors), or 0 without a scan."""
         return np.stack([self.detection_by(sensor, tracks) for sensor in range(len(self.sensors))], axis=1)
 
     def detection_by(self, sensor: int, tracks: TrackTable) -> Floats:
-        """Mean probability of detection by one sensor over each track's density, (num_tracks,); 0 without a scan."""
+        """Mean probability of detection by one sensor over each track's density, (num_tracks,), or 0 without a scan."""
         if not self.scanned[sensor] or tracks.num_tracks == 0:
             return np.zeros(tracks.num_tracks)
         chances = self.sensors[sensor].mean_detection(tracks.means, tracks.covs, self.poses[sensor])
@@ -110,9 +110,9 @@ def view_weights(aligned: AlignedLmbs, weights: Floats, views: FieldsOfView, act
     that a scan has about an existence r. For a present target, a sensor that detects it in .98 of its scans has 190
     times the weight of one that detects it in .2, so that many of the latter do not outvote it. The weight is 0 for a
     sensor that cannot observe the label. The mean is over the density of the sensor with the largest existence among
-    those that observe the label at their own density (if none does, among all that have it; the first on a tie), so
+    those that observe the label at their own density (if none does, among all that have it, the first on a tie), so
     that the belief of a blind sensor has no influence. If no sensor that scanned observes a label, sensors are weighted
-    by how well they would observe it if they scanned; if none would, those that have the label keep their plain
+    by how well they would observe it if they scanned. If none would, those that have the label keep their plain
     weights. weights: (len(active),) of the sensors `active`, positive.
     """
     detection = _detection(aligned, views, active)

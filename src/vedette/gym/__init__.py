@@ -1,6 +1,6 @@
 """Scenarios as environments for reinforcement learning, and policies as planners.
 
-Importing this package registers the environment `vedette/Scenario-v0` with Gymnasium; its argument is a `scenario`.
+Importing this package registers the environment `vedette/Scenario-v0` with Gymnasium. Its argument is a `scenario`.
 """
 
 from vedette.internal.extras import require_packages

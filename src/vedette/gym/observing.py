@@ -27,7 +27,7 @@ class DecisionContext(NamedTuple):
     """A pending decision.
 
     state, poses: the belief, and (num_sensors, 3 or more) poses of the sensors. options: possible actions of each
-    sensor. mask: actions that constraints allow; None without constraints. observation: what the policy receives.
+    sensor. mask: actions that constraints allow, or None without constraints. observation: what the policy receives.
     """
 
     state: State
@@ -42,7 +42,7 @@ class ObservationEncoder:
     """Converts decisions into observations and answers of a policy into actions, for environments and planners alike.
 
     Attributes:
-        sensors: all sensors; those with more than one action are decided about.
+        sensors: all sensors. Those with more than one action are decided about.
         settings: the horizon, over which courses are distinguished.
         constraints: constraints on the sensors.
         schedule: times of scans and decisions.
@@ -131,9 +131,9 @@ def deciding_sensors(options: tuple[Options, ...]) -> tuple[int, ...]:
 
 
 def belief_arrays(belief: Any, step: int, num_labels: int) -> Observation:
-    """Return the most probable targets, in descending order, as arrays of `num_labels` rows; unused rows are 0.
+    """Return the most probable targets, in descending order, as arrays of `num_labels` rows. Unused rows are 0.
 
-    Mean and covariance are those of a label's marginal density; for a belief without labels, the targets are the
+    Mean and covariance are those of a label's marginal density. For a belief without labels, the targets are the
     estimated ones.
     """
     rows = list((belief if isinstance(belief, LabelledDensity) else best_estimate(belief, step)).targets())

@@ -66,7 +66,7 @@ class ScenarioParallelEnv(OfEpisodes, ParallelEnv):  # type: ignore[misc]  # Pet
     def reset(
         self, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[dict[str, Observation], dict[str, dict[str, Any]]]:
-        """Return the first decision of a run; arguments as in `ScenarioEnv.reset`."""
+        """Return the first decision of a run, with arguments as in `ScenarioEnv.reset`."""
         self.episodes.start(seed, (options or {}).get("run"))
         self.agents = self.possible_agents[:]
         return self._observations(), self._all(self.episodes.info)

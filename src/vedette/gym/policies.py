@@ -33,7 +33,7 @@ class PolicyPlanner:
     name: str = "policy"
 
     def plan(self, state: State, poses: Floats, *, rng: np.random.Generator) -> Plan:
-        """Return the policy's actions, changed if constraints forbid them; `rng` is not used.
+        """Return the policy's actions, changed if constraints forbid them. `rng` is not used.
 
         Raises `InputError` for invalid actions.
         """
@@ -45,7 +45,7 @@ class PolicyPlanner:
 def policy_planner(policy: Policy, *, num_labels: int = 10) -> Callable[..., PolicyPlanner]:
     """Return a function that makes a planner of a policy in a scenario.
 
-    In `mine.py` next to a scenario, `steer = policy_planner(policy)`; in the scenario
+    In `mine.py` next to a scenario, `steer = policy_planner(policy)`, and in the scenario
     `planners: {mine: {kind: custom, function: "mine.py:steer"}}`. num_labels: as in the environment.
     """
 

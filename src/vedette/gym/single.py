@@ -15,7 +15,7 @@ from vedette.gym.spaces import space_of
 
 
 class ScenarioEnv(OfEpisodes, gymnasium.Env[dict[str, Any], Any]):
-    """A scenario from decision to decision; one agent chooses the actions of all sensors that have a choice.
+    """A scenario from decision to decision. One agent chooses the actions of all sensors that have a choice.
 
     A step applies the actions and takes the scans up to and including the one before the next decision, or the last one
     of the scenario. The end is a time limit, as targets live on: `truncated`, never `terminated`.
@@ -34,17 +34,17 @@ class ScenarioEnv(OfEpisodes, gymnasium.Env[dict[str, Any], Any]):
         num_labels: int = 10,
         render_mode: str | None = None,
     ) -> None:
-        """Create the environment; nothing is simulated before `reset`.
+        """Create the environment. Nothing is simulated before `reset`.
 
         Args:
-            scenario: name of a built-in one, file or `Scenario`; or several, of which every run draws one; or a
+            scenario: name of a built-in one, file or `Scenario`, or several, of which every run draws one, or a
                 function of a random generator that returns the scenario of a run. All must have the same numbers of
                 sensors, of actions and of components of states and poses.
-            reward: "ospa": minus the OSPA under the scenario's cutoff and order, mean over the scans of the step [m];
+            reward: "ospa": minus the OSPA under the scenario's cutoff and order, mean over the scans of the step [m].
                 "expected_loss": minus `vedette.gym.expected_loss` of the fused belief, also the mean, which does not
-                use the truth; or a function of these `ScanOutcome`s and their `Truth`.
+                use the truth, or a function of these `ScanOutcome`s and their `Truth`.
             num_labels: number of targets in an observation.
-            render_mode: "rgb_array" or "human"; None: nothing is drawn.
+            render_mode: "rgb_array" or "human". None: nothing is drawn.
 
         Raises `VedetteError` for a scenario that cannot be loaded, or without decisions or sensors that decide.
         """
@@ -64,7 +64,7 @@ class ScenarioEnv(OfEpisodes, gymnasium.Env[dict[str, Any], Any]):
         """Return the first decision of a run.
 
         Args:
-            seed: truth and scans are those of run 0 of a campaign with that seed; None: the next run of the previous
+            seed: truth and scans are those of run 0 of a campaign with that seed. None: the next run of the previous
                 seed, which is drawn if none was ever given.
             options: `run`, the number of another run.
         """

@@ -12,7 +12,7 @@ LEAST_EIGENVALUE = 1e-13
 
 
 def covariance_fault(matrix: NDArray[np.float64]) -> tuple[str, str] | None:
-    """Return (expected, got) if a square matrix is not a covariance that the filters can use; None if it is one."""
+    """Return (expected, got) if a square matrix is not a covariance that the filters can use, or None if it is one."""
     if not np.isfinite(matrix).all():
         return "finite numbers", "one that is not"
     if not np.allclose(matrix, matrix.T, rtol=1e-9, atol=0.0):

@@ -21,7 +21,7 @@ def cut_share(num_labels: float, probability: float, max_sets: int) -> float:
 
     Args:
         num_labels: number of unconfirmed labels, at least 0.
-        probability: of each, in (0, 0.5); for larger ones the result is 0.
+        probability: of each, in (0, 0.5). For larger ones the result is 0.
         max_sets: number of hypotheses retained.
     """
     n, expected = math.floor(num_labels), math.floor(num_labels) * probability

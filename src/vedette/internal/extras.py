@@ -31,7 +31,7 @@ EXTRA_OF = {
 def require_packages(what: str, *packages: str) -> None:
     """Do nothing if all the packages (keys of `EXTRA_OF`) are installed.
 
-    Raises `MissingPackageError` otherwise; the message says which packages `what` needs and how to install them.
+    Raises `MissingPackageError` otherwise. The message says which packages `what` needs and how to install them.
     """
     if lacking := without(what, *packages):
         raise MissingPackageError(lacking)

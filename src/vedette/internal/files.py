@@ -21,7 +21,7 @@ _TEMPORARY = re.compile(r"\.(.+)\.[0-9a-f]{32}")  # next to a file until it is w
 def write_whole(target: Path, write: Callable[[BinaryIO], object]) -> None:
     """Let `write` fill a new file next to `target`, sync it to disk, and move it to `target`.
 
-    Raises `OSError` if this fails, or if `target` is a device or a pipe; `target` is then unchanged.
+    Raises `OSError` if this fails, or if `target` is a device or a pipe. `target` is then unchanged.
     """
     if target.exists() and not target.is_file() and not target.is_dir():
         raise OSError(errno.EINVAL, "it is no regular file", str(target))
@@ -50,7 +50,7 @@ def write_file(target: Path, write: Callable[[BinaryIO], object], *, make_folder
 
 
 def sweep(folder: Path, name: str = "") -> None:
-    """Delete what killed processes have left of `write_whole`, for files of this name or all; only under a lock."""
+    """Delete what killed processes have left of `write_whole`, for files of this name or all, only under a lock."""
     if folder.is_dir():
         for path in folder.iterdir():
             if (found := _TEMPORARY.fullmatch(path.name)) and name in ("", found[1]):
@@ -58,7 +58,7 @@ def sweep(folder: Path, name: str = "") -> None:
 
 
 def unwritable(target: Path) -> str:
-    """Return the reason why no file can be written at `target`; empty if its nearest existing folder is writable."""
+    """Return the reason why no file can be written at `target`, empty if its nearest existing folder is writable."""
     around = next(folder for folder in target.absolute().parents if folder.exists())
     if not around.is_dir():
         return f"{around} is no folder"

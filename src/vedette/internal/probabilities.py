@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 
 def expit(log_odds: ArrayLike) -> NDArray[np.float64]:
-    """Return the probability with these log-odds; exact to rounding at both ends, 0 and 1 at the infinities."""
+    """Return the probability with these log-odds, exact to rounding at both ends, 0 and 1 at the infinities."""
     log_odds = np.asarray(log_odds, np.float64)
     small = np.exp(-np.abs(log_odds))
     found: NDArray[np.float64] = np.where(log_odds < 0.0, small, 1.0) / (1.0 + small)
@@ -27,7 +27,7 @@ def log_expit(log_odds: ArrayLike) -> NDArray[np.float64]:
 
 
 def logit(probability: float) -> float:
-    """Return the log-odds of a probability; infinite for 0 and 1."""
+    """Return the log-odds of a probability, infinite for 0 and 1."""
     if probability <= 0.0 or probability >= 1.0:
         return math.copysign(math.inf, probability - 0.5)
     return math.log(probability / (1.0 - probability))
@@ -36,7 +36,7 @@ def logit(probability: float) -> float:
 def chi_squared_quantile(dim: int, probability: float) -> float:
     """Return the quantile at `probability` of the chi-squared distribution with `dim` degrees of freedom.
 
-    Newton's method on the log of the tail, kept inside a bracket; exact to about 1e-15 / probability.
+    Newton's method on the log of the tail, kept inside a bracket, exact to about 1e-15 / probability.
     """
     if probability <= 0.0 or probability >= 1.0:
         return math.inf if probability >= 1.0 else 0.0

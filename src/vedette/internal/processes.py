@@ -34,7 +34,7 @@ def context() -> BaseContext:
 
 
 def load_ahead(*more: str) -> None:
-    """Start the server process from which children are forked; it loads their modules while this process continues.
+    """Start the server process from which children are forked. It loads their modules while this process continues.
 
     Args:
         more: modules to load in addition to those that the workers of a campaign need.
@@ -101,7 +101,7 @@ def _interrupts_blocked() -> Iterator[None]:
 
 
 def let_go_of_results(pool: ProcessPoolExecutor) -> None:
-    """Close this process's write end of the result pipe of a pool whose processes have started; they have their own.
+    """Close this process's write end of the result pipe of a pool whose processes have started. They have their own.
 
     While it is open, a reader waits for ever for the rest of a message from a killed process.
     """

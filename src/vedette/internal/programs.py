@@ -35,7 +35,7 @@ _Questions: TypeAlias = "SimpleQueue[bytes | None]"
 
 
 class Program:
-    """External program that answers each line of JSON with a line of JSON; ends with this object, or with this process.
+    """External program that answers each line of JSON with a line of JSON. Ends with this object, or with this process.
 
     Args:
         command: the program and its arguments.
@@ -158,7 +158,7 @@ def _guard_of(child: subprocess.Popen[bytes]) -> subprocess.Popen[bytes] | None:
 
 
 def _end(child: subprocess.Popen[bytes], guard: subprocess.Popen[bytes] | None, questions: _Questions) -> None:
-    """Close the program's input; kill the program if it does not end by itself."""
+    """Close the program's input. Kill the program if it does not end by itself."""
     questions.put(None)
     with suppress(subprocess.TimeoutExpired):
         child.wait(_FAREWELL_SECONDS)

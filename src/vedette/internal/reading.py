@@ -1,6 +1,6 @@
 """Bounded readers for untrusted content: memory stays below a small multiple of the size of the input.
 
-Every function raises `ValueError` for content that it refuses; the message fits after "it is damaged: ".
+Every function raises `ValueError` for content that it refuses. The message fits after "it is damaged: ".
 """
 
 from __future__ import annotations
@@ -51,7 +51,7 @@ def unreadable(path: Path, what: str, error: OSError) -> InputError:
 
 
 def read_text(path: Path, what: str, most: int) -> str:
-    """Return the text of a UTF-8 file of at most `most` bytes; messages call it `what`.
+    """Return the text of a UTF-8 file of at most `most` bytes. Messages call it `what`.
 
     Raises:
         InputError: the file cannot be read, is too large, or is not UTF-8 text.
@@ -107,7 +107,7 @@ def _whole(text: str) -> int:
 
 
 def inflate(packed: bytes, most: int = MOST_BYTES) -> bytes:
-    """Return the content that zlib packed into these bytes; nothing may follow it."""
+    """Return the content that zlib packed into these bytes. Nothing may follow it."""
     unpacking = zlib.decompressobj()
     try:
         content = unpacking.decompress(packed, most)
@@ -141,7 +141,7 @@ def read_members(archive: bytes, wanted: Container[str] | None = None) -> dict[s
 
 
 def read_array(content: bytes) -> np.ndarray[Any, Any]:
-    """The array of the bytes of an `.npy` file; never an object."""
+    """The array of the bytes of an `.npy` file, never an object."""
     file = io.BytesIO(content)
     try:
         version = np.lib.format.read_magic(file)

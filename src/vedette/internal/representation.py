@@ -20,13 +20,13 @@ class SummaryRepr:
     __slots__ = ()
 
     def _summary(self) -> str:
-        """Return content and size, to follow the class name; by default the fields, arrays by their shapes."""
+        """Return content and size, to follow the class name, by default the fields, arrays by their shapes."""
         names = [name for name in self.__match_args__ if not name.startswith("_")]  # type: ignore[attr-defined]
         told = [f"{name} {_brief(getattr(self, name))}" for name in names[:_MOST_FIELDS]]
         return "of " + ", ".join(told + [ELLIPSIS] * (len(names) > _MOST_FIELDS))
 
     def _detail(self) -> str:
-        """Return the most important facts about the content; empty if there are none."""
+        """Return the most important facts about the content, empty if there are none."""
         return ""
 
     def in_short(self) -> str:
@@ -61,7 +61,7 @@ class TabularRepr(SummaryRepr):
 
 
 def in_short(value: Any) -> str:
-    """Return a container on one line; of other objects only the type name."""
+    """Return a container on one line, or of other objects only the type name."""
     return value.in_short() if isinstance(value, SummaryRepr) else type(value).__name__
 
 

@@ -31,12 +31,12 @@ def join_alternatives(names: Sequence[str]) -> str:
 
 
 def named_in(name: str, unit: str) -> str:
-    """Return a name with its unit: `OSPA (m)`; without a unit only the name."""
+    """Return a name with its unit: `OSPA (m)`, or without a unit only the name."""
     return f"{name} ({unit})" if unit else name
 
 
 def with_unit(number: str, unit: str) -> str:
-    """Return a number with its unit: `1.25 m`; without a unit only the number."""
+    """Return a number with its unit: `1.25 m`, or without a unit only the number."""
     return f"{number} {unit}" if unit else number
 
 
@@ -47,7 +47,7 @@ def unique_name(name: str, taken: Collection[str]) -> str:
 
 
 def with_error(mean: float, error: float | None, sign: str = "") -> str:
-    """Return `12.30 ± 0.45`; without the standard error if it is None or NaN. sign: "+" to always show a sign."""
+    """Return `12.30 ± 0.45`, or without the standard error if it is None or NaN. sign: "+" to always show a sign."""
     text = f"{mean:{sign}.2f}"
     return text if error is None or error != error else f"{text} ± {error:.2f}"
 
@@ -58,7 +58,7 @@ def with_minus(text: str) -> str:
 
 
 def markdown_table(header: Sequence[str], rows: Iterable[Sequence[str]], *, numbers: bool = True) -> str:
-    """Return a table in Markdown; the first column is left-aligned, the others are right-aligned if `numbers`."""
+    """Return a table in Markdown. The first column is left-aligned, the others are right-aligned if `numbers`."""
     lines = ["| " + " | ".join(header) + " |", "| --- |" + (" ---: |" if numbers else " --- |") * (len(header) - 1)]
     return "\n".join([*lines, *("| " + " | ".join(row) + " |" for row in rows)]) + "\n"
 
@@ -88,7 +88,7 @@ def spreadsheet_text(text: str) -> str:
 
 
 def elided(text: str, most: int = 24) -> str:
-    """Return the text on one line; if it is wider than `most` columns, only its beginning and its end."""
+    """Return the text on one line, or if it is wider than `most` columns, only its beginning and its end."""
     text = " ".join(text.split())
     if cell_len(text) <= most:
         return text
@@ -97,13 +97,13 @@ def elided(text: str, most: int = 24) -> str:
 
 
 def _fitting(text: str, most: int) -> str:
-    """Return the longest beginning that fits into `most` columns; wide characters (Chinese, emoji) take two."""
+    """Return the longest beginning that fits into `most` columns. Wide characters (Chinese, emoji) take two."""
     first = chop_cells(text, max(most, 1))[0]
     return first if cell_len(first) <= most else ""
 
 
 def elided_apart(names: Sequence[str], most: int = 24) -> tuple[str, ...]:
-    """Return each name elided; names that would then be equal get their position, from 1, appended."""
+    """Return each name elided. Names that would then be equal get their position, from 1, appended."""
     short = [elided(name, most) for name in names]
     return tuple(
         text if short.count(text) == 1 else f"{elided(name, most - 5)} ({place})"

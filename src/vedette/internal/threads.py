@@ -1,4 +1,4 @@
-"""Distribution of independent items over threads, in pieces; kernels run without the interpreter lock."""
+"""Distribution of independent items over threads, in pieces. Kernels run without the interpreter lock."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ def run_chunks(work: Callable[[int, int], None], num_items: int, num_threads: in
 
     Each item writes its own results, so results depend neither on the pieces nor on the number of threads. If several
     items raise, the exception of the first item is raised. An interruption is raised when the running pieces are
-    finished; a piece takes about a tenth of a second, or as long as one item. first_piece: number of items in the first
+    finished. A piece takes about a tenth of a second, or as long as one item. first_piece: number of items in the first
     piece of a thread, more than one if items are known to be quick.
     """
     num_workers = max(1, min(num_threads, num_items))

@@ -1,1 +1,1 @@
-"""Everything compiled. Arrays in, arrays out; knows none of the classes above it."""
+"""Everything compiled. Arrays in, arrays out. This layer knows none of the classes above it."""

@@ -1,4 +1,4 @@
-"""Live tracking: lines of JSON with scans in, estimates and plans out; recorded, and resumed after interruptions."""
+"""Live tracking: lines of JSON with scans in, estimates and plans out, recorded, and resumed after interruptions."""
 
 from vedette.live.answers import Answer, encode_line
 from vedette.live.building import build_live_loop

@@ -38,9 +38,9 @@ def build_live_loop(
         planner: name of the planner, used if there are decisions: at the scenario's times or every `decide_every`.
         max_delay: largest delay of a scan in s.
         max_lead: largest time in s by which a scan may be ahead of all others.
-        decide_every: time between decisions in s; None: at the times of the scenario.
+        decide_every: time between decisions in s. None: at the times of the scenario.
         seed: seed for decisions and for filters that draw random numbers.
-        num_threads: number of threads for a decision; 0: one per processor.
+        num_threads: number of threads for a decision. 0: one per processor.
 
     Raises:
         InputError: incompatible parts, a kind of measurement that lines cannot express, or a planner that needs the

@@ -26,7 +26,7 @@ class LiveFit:
     """Window of the latest instants, and what the model does not explain in it.
 
     Attributes:
-        before: the latest instant; None before the first.
+        before: the latest instant, or None before the first.
         compared: the instants of the window.
         num_scans: scans since the last test.
         found: findings, each with the number of tests since it was found.
@@ -75,7 +75,7 @@ class LiveFit:
         return LiveFit(instants[-1], window, num_scans, found, searched)
 
     def without(self, others: Sequence[Finding]) -> list[Finding]:
-        """Return the findings that are not among others; numbers, which change from test to test, do not count."""
+        """Return the findings that are not among others. Numbers, which change from test to test, do not count."""
         names = [(each.test, each.sensor, re.sub(r"\d+", "", each.text)) for each in (*others, *self.fit.findings)]
         own, known = names[len(others) :], names[: len(others)]
         return [each for each, name in zip(self.fit.findings, own, strict=True) if name not in known]

@@ -41,12 +41,12 @@ class LiveState:
         timeline: timeline of the scans that were processed.
         num_lines: number of lines that arrived.
         num_errors: number of errors in lines and plans.
-        start: offset in s from times of the timeline to times in lines; None before the first scan.
+        start: offset in s from times of the timeline to times in lines, or None before the first scan.
         is_utc: True if times in lines are seconds since 1970.
-        latest: (num_sensors,) time of the latest scan of each sensor in s; -inf before its first.
-        claimed: time of the latest scan that was far ahead, in s; inf: none.
+        latest: (num_sensors,) time of the latest scan of each sensor in s, or -inf before its first.
+        claimed: time of the latest scan that was far ahead, in s. inf: none.
         claimants: sensors of the consecutive scans that agreed on it.
-        due: time of the next decision in s; inf: none.
+        due: time of the next decision in s. inf: none.
         num_decisions: number of decisions so far.
         spreads: of the returns of each sensor.
         fit: of the assumed model to the latest scans.
@@ -77,20 +77,20 @@ class LiveLoop:
         sites: the sensors, as in `read_message`.
         estimate: estimator of the targets.
         conventions, origin: conventions of the lines, and origin of the plane.
-        first_time: time of the first scan on the clock of the tracker, in s, if times are dates; other times are
+        first_time: time of the first scan on the clock of the tracker, in s, if times are dates. Other times are
             unchanged.
-        planner: planner of the decisions; None: no decisions.
+        planner: planner of the decisions. None: no decisions.
         decision_times: times of the decisions in s, increasing.
         decide_every: time between decisions in s, from the first scan on, instead of `decision_times`.
-        max_lead: s; a scan further ahead of all others is refused unless several in a row agree, because one wrong
+        max_lead: s. A scan further ahead of all others is refused unless several in a row agree, because one wrong
             clock would otherwise end the window of all other sensors.
         seed: seed of the decisions.
-        classes: names of the classes of targets; () if they have none.
-        valid_area: (2, 2) lower left and upper right corner of the area of valid measurements, in m; others are left
+        classes: names of the classes of targets, or () if they have none.
+        valid_area: (2, 2) lower left and upper right corner of the area of valid measurements, in m. Others are left
             out and counted in the answer as `beyond`. None: no limit.
-        extents: for each sensor, the largest distance in m between neighbouring returns of a target; 0: returns are
+        extents: for each sensor, the largest distance in m between neighbouring returns of a target. 0: returns are
             not merged.
-        assumed: models that are tested against the latest scans; None: no tests.
+        assumed: models that are tested against the latest scans. None: no tests.
     """
 
     tracker: OutOfSequenceTracker
@@ -111,7 +111,7 @@ class LiveLoop:
 
     @property
     def compass(self) -> Compass | None:
-        """Compass of directions in answers; None: angles in the plane, counter-clockwise from east."""
+        """Compass of directions in answers. None: angles in the plane, counter-clockwise from east."""
         if self.origin is not None:
             return self.origin
         return PlaneCompass() if any(site.compass for site in self.sites) else None
@@ -122,10 +122,10 @@ class LiveLoop:
         return LiveState(self.tracker.initial(), latest=(-math.inf,) * num, spreads=(Spread(),) * num)
 
     def process(self, state: LiveState, line: bytes) -> tuple[LiveState, tuple[Answer, ...]]:
-        """Process a line; answer with the estimates and, if one was due, a plan, or with the error in the line.
+        """Process a line, and answer with the estimates and, if one was due, a plan, or with the error in the line.
 
         Returns:
-            The state after the line, and the answers; `encode_line` converts each into a line.
+            The state after the line, and the answers. `encode_line` converts each into a line.
         """
         state = replace(state, num_lines=state.num_lines + 1)
         place = f"line {state.num_lines}"
@@ -179,7 +179,7 @@ class LiveLoop:
         return replace(scan, measurements=rows[inside]), int(np.count_nonzero(~inside))
 
     def _merge_returns(self, state: LiveState, scan: SensorScan) -> tuple[LiveState, SensorScan]:
-        """Return the scan with one measurement a target; its noise grows by the spread of all returns so far."""
+        """Return the scan with one measurement a target. Its noise grows by the spread of all returns so far."""
         s, rows = scan.sensor, np.asarray(scan.measurements, np.float64)
         if not self.extents or self.extents[s] <= 0.0 or not len(rows):
             return state, scan

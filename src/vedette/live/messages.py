@@ -30,7 +30,7 @@ _KEYS = (*_REQUIRED, "pose", "velocity", "times", "stds", "snr_db", "class", "si
 
 
 def is_message(line: bytes) -> bool:
-    """Return True if a line has the form of a message; its values are not checked."""
+    """Return True if a line has the form of a message. Its values are not checked."""
     try:
         _object(line, "line")
     except InputError:
@@ -54,12 +54,12 @@ def read_message(
     have the components of `vedette.internal.quantities.COMPONENTS`, in rad (degrees for a sensor with a compass) and m
     unless `conventions.units` has others. The direction of angles is that of `conventions.bearings`, else the sensor's.
     The optional pose is `[x, y, heading_rad, ...]`, or `{"lon": , "lat": , "course_deg": }`, where the course,
-    clockwise from true north as in plans, is optional; or with `heading_deg`, which has the direction of bearings and
+    clockwise from true north as in plans, is optional, or with `heading_deg`, which has the direction of bearings and
     needs `bearings` or a compass. For a sensor that measures range rates or turns, `"velocity": [vx, vy]` is its own
     velocity in m/s. For a sensor that turns, `"times"` has the time of each measurement, and `time` is the middle of
-    the turn; without `"times"`, all measurements are of one time. `"stds"` has a row of standard deviations for each
-    measurement, in its units, null where the sensor's noise model holds; `"snr_db"` the signal-to-noise ratio of each
-    measurement of a sensor with `signal`, or null; `"class"` and `"size_m"` the reported class and the size of each,
+    the turn. Without `"times"`, all measurements are of one time. `"stds"` has a row of standard deviations for each
+    measurement, in its units, null where the sensor's noise model holds. `"snr_db"` the signal-to-noise ratio of each
+    measurement of a sensor with `signal`, or null. `"class"` and `"size_m"` the reported class and the size of each,
     for a sensor with `classification`, or null. `"pose_stds"` has standard deviations of the pose, `{"x": , "y": ,
     "heading_deg": , "height": , "vx": , "vy": }`, each optional.
 
@@ -67,11 +67,11 @@ def read_message(
         line: line of UTF-8 text.
         place: name of the line in messages.
         sites: the sensors, in the order of the tracker's.
-        conventions: units and bearings; its other fields are not used.
+        conventions: units and bearings. Its other fields are not used.
         origin: origin of longitudes and latitudes.
 
     Raises:
-        InputError: an invalid field; the message has its name, the expected and the given value.
+        InputError: an invalid field. The message has its name, the expected and the given value.
     """
     data = _object(line, place)
     number = _sensor(data["sensor"], place, sites)

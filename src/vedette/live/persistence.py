@@ -29,11 +29,11 @@ class PersistentLoop:
     Args:
         live: the loop.
         identity: identifier of the loop in its snapshots, such as a digest of its files.
-        snapshot: file of the state; None: no snapshots.
+        snapshot: file of the state. None: no snapshots.
         snapshot_interval: time between snapshots in s.
-        record: file of the lines; None: no record.
+        record: file of the lines. None: no record.
         clock: function that returns a time in s, for the times of snapshots.
-        report: receives the message if a snapshot cannot be written; the loop continues.
+        report: receives the message if a snapshot cannot be written. The loop continues.
 
     Raises:
         InputError: a file that cannot be read or written, belongs to another loop, or is in use by another process.
@@ -71,7 +71,7 @@ class PersistentLoop:
             self._locks = locks.pop_all()
 
     def resume(self) -> Iterator[tuple[Answer, ...]]:
-        """Process the lines of the record after the snapshot; yield the answers to each."""
+        """Process the lines of the record after the snapshot, and yield the answers to each."""
         if self._record is None:
             return
         num_in_snapshot, num = self.state.num_lines, 0

@@ -36,7 +36,7 @@ class Remarks:
         """Remark that a client did something.
 
         Args:
-            client: the client; the remark begins with its name.
+            client: the client. The remark begins with its name.
             kind: what the client did, with the same words for all remarks of a kind.
             detail: further text for this remark.
         """

@@ -61,7 +61,7 @@ class Client(Protocol):
     address: str  # the name without the port
 
     def send(self, text: bytes) -> None:
-        """Send without waiting; unread bytes stay in a buffer."""
+        """Send without waiting. Unread bytes stay in a buffer."""
         ...
 
     def unread(self) -> int:
@@ -87,14 +87,14 @@ class LineServer:
     """Exchange that processes the lines of many clients: estimates and plans go to all, an error only to its sender.
 
     A client that sends faster than lines are processed waits, by the flow control of TCP, while other clients are
-    served; no queue builds up. A client that does not read its answers is disconnected. A client enters after its token
+    served. No queue builds up. A client that does not read its answers is disconnected. A client enters after its token
     or its handshake. If more than `MAX_WAITING` have not entered, the first client of the address with the most of
     them is disconnected. If there is no room, a client that was silent for `IDLE_SECONDS`, or has not sent a valid line
     within `FIRST_LINE_SECONDS`, is disconnected.
 
     Args:
         process: function that processes a line and returns its answers.
-        token: token that clients must send; None: no token.
+        token: token that clients must send. None: no token.
         report: receives remarks about clients, at most one per kind, address and minute.
     """
 
@@ -123,7 +123,7 @@ class LineServer:
         )
 
     def open(self, client: Client) -> None:
-        """Register a connection that has not entered; another one may be disconnected. It must `leave` at its end."""
+        """Register a connection that has not entered. Another one may be disconnected. It must `leave` at its end."""
         self._waiting[client] = None
         if len(self._waiting) > MAX_WAITING:
             ((address, _),) = Counter(each.address for each in self._waiting).most_common(1)
@@ -133,7 +133,7 @@ class LineServer:
             first.abort()
 
     def enter(self, client: Client, *, is_page: bool = False) -> str:
-        """Let a client in, which receives all answers from now on; return "", or the reason if there is no room."""
+        """Let a client in, which receives all answers from now on, and return "", or the reason if there is no room."""
         num_from_address = sum(each.address == client.address for each in self._entered)
         if num_from_address >= MAX_CLIENTS_PER_ADDRESS and not self._disconnect_idle(client.address):
             return f"expected at most {MAX_CLIENTS_PER_ADDRESS} clients of one address; got one more"
@@ -144,7 +144,7 @@ class LineServer:
         return ""
 
     def _disconnect_idle(self, address: str | None) -> bool:
-        """Disconnect the client, of this or any address, that was silent longest; return False if none was."""
+        """Disconnect the client, of this or any address, that was silent longest, and return False if none was."""
         now = asyncio.get_running_loop().time()
         silent = [
             (since, entered)
@@ -205,13 +205,13 @@ class _TcpClient:
 
 
 class TcpServer:
-    """TCP server of a line server; each client first sends `{"token": "..."}` if a token is needed."""
+    """TCP server of a line server. Each client first sends `{"token": "..."}` if a token is needed."""
 
     def __init__(self, line_server: LineServer) -> None:
         self._line_server = line_server
 
     async def listen(self, host: str, port: int) -> asyncio.Server:
-        """Start to listen; raises `InputError` if the address is not available."""
+        """Start to listen. Raises `InputError` if the address is not available."""
         try:
             return await asyncio.start_server(self._handle, host, port, backlog=BACKLOG)
         except OSError as error:

@@ -78,12 +78,12 @@ class WebServer:
     """WebSocket and page server of a line server.
 
     Frames are drawn at most ten times a second, once for all pages, and only if there are pages. A page gets the next
-    frame after it has acknowledged the last one; a slow page misses some, and receives the number it missed.
+    frame after it has acknowledged the last one. A slow page misses some, and receives the number it missed.
 
     Args:
         line_server: processes the lines.
         screen: content of the pages.
-        host: name of this machine that clients may use, in addition to loopback names; with a token, any name is valid.
+        host: name of this machine that clients may use, in addition to loopback names. With a token, any name is valid.
     """
 
     def __init__(self, line_server: LineServer, screen: Screen, host: str) -> None:
@@ -92,7 +92,7 @@ class WebServer:
         self._drawn = asyncio.Condition()
 
     async def listen(self, port: int) -> Server:
-        """Start to listen; raises `InputError` if the address is not available."""
+        """Start to listen. Raises `InputError` if the address is not available."""
 
         class ListeningSocket(_Socket):
             line_server = self._line_server
@@ -117,7 +117,7 @@ class WebServer:
         return server
 
     async def _answer_request(self, socket: ServerConnection, request: Request) -> Response | None:
-        """Return the page or a refusal; None to open a socket."""
+        """Return the page or a refusal, or None to open a socket."""
         assert isinstance(socket, _Socket)
         address = urlsplit(request.path)
         if (fault := self._request_fault(request)) is not None:
@@ -135,7 +135,7 @@ class WebServer:
         return Response(HTTPStatus.OK, "OK", headers, page)
 
     def _request_fault(self, request: Request) -> str | None:
-        """Return the fault of a request from another web page or for another name of this machine; None if valid."""
+        """Return the fault of a request from another web page or for another name of this machine, or None if valid."""
         try:
             host, origin = request.headers.get("Host", ""), request.headers.get("Origin")
             name = urlsplit(f"//{host}").hostname or ""
@@ -192,7 +192,7 @@ class WebServer:
             await self._drawn.wait_for(lambda: self._num_drawn > drawn)
 
     async def _draw(self) -> None:
-        """Draw the frames of all pages; a frame that fails is reported, and the next one is tried."""
+        """Draw the frames of all pages. A frame that fails is reported, and the next one is tried."""
         while True:
             await self._line_server.changed.wait()
             self._line_server.changed.clear()

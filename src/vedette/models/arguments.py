@@ -1,4 +1,4 @@
-"""Checks of arguments; each raises `InputError` with the field, the expected and the given value."""
+"""Checks of arguments. Each raises `InputError` with the field, the expected and the given value."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ _MOST_STATE_DIMENSIONS = 10_000
 
 
 def reject(field: str, expected: str, got: Any) -> InputError:
-    """Return the error for an invalid argument; a long value is shortened."""
+    """Return the error for an invalid argument. A long value is shortened."""
     text = printable(got if isinstance(got, str) else plain(got))
     if not isinstance(got, str) and " at 0x" in text:  # the address of an object does not describe it
         text = " ".join([f"a {type(got).__name__}", *([got.__qualname__] if hasattr(got, "__qualname__") else [])])
@@ -32,7 +32,7 @@ def reject(field: str, expected: str, got: Any) -> InputError:
 
 
 def real(field: str, value: Any) -> float:
-    """Return the value as a float; it must be a finite real number."""
+    """Return the value as a float. It must be a finite real number."""
     try:
         number = math.nan if isinstance(value, bool) or not isinstance(value, numbers.Real) else float(value)
     except OverflowError:  # a whole number of hundreds of digits
@@ -48,49 +48,49 @@ def is_infinite(value: Any) -> bool:
 
 
 def positive(field: str, value: Any) -> float:
-    """Return the value as a float; it must be finite and above 0."""
+    """Return the value as a float. It must be finite and above 0."""
     if real(field, value) <= 0.0:
         raise reject(field, "a number above 0", value)
     return float(value)
 
 
 def non_negative(field: str, value: Any) -> float:
-    """Return the value as a float; it must be finite and at least 0."""
+    """Return the value as a float. It must be finite and at least 0."""
     if real(field, value) < 0.0:
         raise reject(field, "a number of at least 0", value)
     return float(value)
 
 
 def probability(field: str, value: Any) -> float:
-    """Return the value as a float; it must be in [0, 1]."""
+    """Return the value as a float. It must be in [0, 1]."""
     if not 0.0 <= real(field, value) <= 1.0:
         raise reject(field, "a probability in [0, 1]", value)
     return float(value)
 
 
 def chance(field: str, value: Any) -> float:
-    """Return the value as a float; it must be above 0 and below 1."""
+    """Return the value as a float. It must be above 0 and below 1."""
     if not 0.0 < real(field, value) < 1.0:
         raise reject(field, "a probability above 0 and below 1", value)
     return float(value)
 
 
 def one_of(field: str, value: Any, words: Collection[str]) -> str:
-    """Return the value; it must be one of these words."""
+    """Return the value. It must be one of these words."""
     if not isinstance(value, str) or value not in words:
         raise reject(field, f"one of {', '.join(words)}", value)
     return value
 
 
 def flag(field: str, value: Any) -> bool:
-    """Return the value as a bool; it must be true or false."""
+    """Return the value as a bool. It must be true or false."""
     if not isinstance(value, bool | np.bool_):
         raise reject(field, "true or false", value)
     return bool(value)
 
 
 def provides(value: object, protocol: Any) -> TypeGuard[Any]:
-    """Return what `isinstance` returns for a protocol; ten times faster before Python 3.12, for use in loops."""
+    """Return what `isinstance` returns for a protocol, ten times faster before Python 3.12, for use in loops."""
     for name in protocol_members(protocol):  # noqa: SIM110  # a generator needs one more call per name
         if getattr(value, name, None) is None:
             return False
@@ -113,7 +113,7 @@ def instance(field: str, value: Any, kind: type) -> None:
 
 
 def sequence(field: str, values: Any, expected: str) -> tuple[Any, ...]:
-    """Return the items of a list, tuple, array or iterator; texts and mappings are rejected."""
+    """Return the items of a list, tuple, array or iterator. Texts and mappings are rejected."""
     if isinstance(values, str | bytes | Mapping) or not isinstance(values, Iterable):
         raise reject(field, expected, values)
     if isinstance(values, np.ndarray) and values.ndim == 0:
@@ -134,7 +134,7 @@ def one_a_sensor(num_sensors: int, **fields: Any) -> None:
 
 
 def dimension(field: str, value: Any) -> int:
-    """Return the value as an int; it must be a whole number from 1 to 2^62, the largest for kernels."""
+    """Return the value as an int. It must be a whole number from 1 to 2^62, the largest for kernels."""
     if isinstance(value, bool) or not isinstance(value, numbers.Integral) or value < 1:
         raise reject(field, "a whole number of at least 1", value)
     if int(value) > _MAX_COUNT:
@@ -143,14 +143,14 @@ def dimension(field: str, value: Any) -> int:
 
 
 def count(field: str, value: Any) -> int:
-    """Return the value as an int; it must be a whole number of at least 0."""
+    """Return the value as an int. It must be a whole number of at least 0."""
     if isinstance(value, bool) or not isinstance(value, numbers.Integral) or value < 0:
         raise reject(field, "a whole number of at least 0", value)
     return int(value)
 
 
 def no_gaussians(state_dim: Any) -> tuple[Floats, Floats]:
-    """Return (0, state_dim) means and (0, state_dim, state_dim) covariances; raise for an invalid `state_dim`."""
+    """Return (0, state_dim) means and (0, state_dim, state_dim) covariances, and raise for an invalid `state_dim`."""
     dim = dimension("state_dim", state_dim)
     if dim > _MOST_STATE_DIMENSIONS:
         raise reject("state_dim", f"a whole number of at most {_MOST_STATE_DIMENSIONS}", state_dim)
@@ -158,7 +158,7 @@ def no_gaussians(state_dim: Any) -> tuple[Floats, Floats]:
 
 
 def step_number(value: Any) -> int:
-    """Return the value as the number of a step; it must be a whole number from 1 on that labels can hold."""
+    """Return the value as the number of a step. It must be a whole number from 1 on that labels can hold."""
     whole = not isinstance(value, bool) and isinstance(value, numbers.Integral)
     if not whole or not 1 <= value < 2**63:
         raise reject("step", "a whole number from 1 on, below 2^63", value)
@@ -166,7 +166,7 @@ def step_number(value: Any) -> int:
 
 
 def generator(value: Any) -> np.random.Generator:
-    """Return the random generator; a seed is rejected, because each call with it would get the same numbers."""
+    """Return the random generator. A seed is rejected, because each call with it would get the same numbers."""
     if not isinstance(value, np.random.Generator):
         raise reject("rng", "a numpy.random.Generator, such as numpy.random.default_rng(1)", value)
     return value
@@ -200,7 +200,7 @@ def _is_masked(values: Any) -> bool:
 def float_array(field: str, values: Any, shape: tuple[int | None, ...], *, finite: bool = True) -> Floats:
     """Return a C-contiguous, writeable float64 copy of `values` with the given shape (None: any length).
 
-    NaN is never accepted; infinities are accepted only if `finite` is false.
+    NaN is never accepted. Infinities are accepted only if `finite` is false.
     """
     if type(values) is np.ndarray and values.dtype == np.float64:
         given = values
@@ -229,7 +229,7 @@ def params_vector(field: str, values: Any) -> Floats:
 
 
 def pose_vector(field: str, values: Any) -> Floats:
-    """Return a sensor pose [px, py, heading_rad, ...] as an array; warn of a heading that looks like degrees."""
+    """Return a sensor pose [px, py, heading_rad, ...] as an array, and warn of a heading that looks like degrees."""
     pose = float_array(field, values, (None,))
     if len(pose) < 3:
         raise reject(field, "an array of shape (3 or more,)", f"shape {pose.shape}")
@@ -246,7 +246,7 @@ def warn_if_degrees(field: str, heading: float) -> None:
 
 
 def state_table(field: str, values: Any, state_dim: int | None = None) -> Floats:
-    """Return the states as an (n, state_dim) array; a single state may be given as a vector."""
+    """Return the states as an (n, state_dim) array. A single state may be given as a vector."""
     array = as_array(field, values, "fiu", "numbers, one state a row")
     if array.ndim == 1 and array.size:
         return float_array(field, array[np.newaxis], (1, state_dim))

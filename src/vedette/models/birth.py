@@ -30,15 +30,15 @@ class MeasurementBirth:
     (Reuter, Vo, Vo, Dietmayer 2014, section IV-C).
 
     Attributes:
-        expected: expected number of targets that appear between two scans, or within the `period` of the births;
+        expected: expected number of targets that appear between two scans, or within the `period` of the births.
             learnt: estimated from the first detections, in filters with an intensity of undetected targets.
         max_existence: largest existence of a label that starts at the next scan, in (0, 1).
-        std: (state_dim,) standard deviation of the state of a new label; for the position about twice that of the
+        std: (state_dim,) standard deviation of the state of a new label, for the position about twice that of the
             noise.
-        region: region in which targets appear; None: anywhere.
+        region: region in which targets appear. None: anywhere.
 
     Raises:
-        InputError: an invalid field; the message has its name, the expected and the given value.
+        InputError: an invalid field. The message has its name, the expected and the given value.
     """
 
     expected: float | Literal["learnt"]
@@ -70,7 +70,7 @@ class MeasurementBirth:
         return isinstance(self.expected, str) and self.expected == LEARNT
 
     def uniform(self, cells_a_side: int = _CELLS) -> UndetectedModel | None:
-        """Return the model of undetected targets that is uniform over the region, on cells; None without a region.
+        """Return the model of undetected targets that is uniform over the region, on cells, or None without a region.
 
         With a known rate, births are not included, as they may be a number per scan. With a learnt rate, one target is
         expected before the first scan.
@@ -98,20 +98,20 @@ class BirthModel:
         existence: (num_sites,) birth probability of each site, in (0, 1).
         means: (num_sites, state_dim) mean state of a birth.
         covs: (num_sites, state_dim, state_dim) covariance of a birth, symmetric positive definite.
-        steps: the filter steps at which births at the sites may happen; None: every step.
-        from_measurements: further births, from measurements that no track explains; None: no such births.
+        steps: the filter steps at which births at the sites may happen. None: every step.
+        from_measurements: further births, from measurements that no track explains. None: no such births.
         anywhere: model of undetected targets with more detail than `from_measurements`: initial number, birth rate and
-            places of entry. Filters with an intensity of undetected targets use it; None: they use that of
+            places of entry. Filters with an intensity of undetected targets use it. None: they use that of
             `from_measurements`.
-        period: time in s for which birth probabilities are given, also those from measurements; None: each step,
+        period: time in s for which birth probabilities are given, also those from measurements. None: each step,
             whatever its length (the paper).
-        class_probs: (num_classes,) probability of each class of target, which sum to 1; None: targets have no classes.
+        class_probs: (num_classes,) probability of each class of target, which sum to 1. None: targets have no classes.
             The classes of a sensor's measurements are in the same order (`vedette.models.with_row_noise`).
         num_sites: number of birth sites.
         state_dim: length of a target's state.
 
     Raises:
-        InputError: an invalid field; the message has its name, the expected and the given value.
+        InputError: an invalid field. The message has its name, the expected and the given value.
     """
 
     existence: Floats
@@ -154,7 +154,7 @@ class BirthModel:
 
     @property
     def num_classes(self) -> int:
-        """Number of classes of targets; 0 if they have none."""
+        """Number of classes of targets, or 0 if they have none."""
         return 0 if self.class_probs is None else len(self.class_probs)
 
     @property
@@ -168,9 +168,9 @@ class BirthModel:
         return self.num_sites > 0 and (self.steps is None or step in self.steps)
 
     def least_existence(self, clutter_rate: float) -> float:
-        """Return the least existence of a label of a filter with labelled births; 1 without births.
+        """Return the least existence of a label of a filter with labelled births, or 1 without births.
 
-        clutter_rate: mean number of false measurements of a scan; births from measurements are divided among them.
+        clutter_rate: mean number of false measurements of a scan. Births from measurements are divided among them.
         """
         least, measured = float(self.existence.min(initial=1.0)), self.from_measurements
         if measured is None or measured.is_learnt:

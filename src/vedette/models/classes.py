@@ -20,11 +20,11 @@ class ClassFeatures:
     Attributes:
         class_probs: (num_classes,) probability of each class of target, which sum to 1. They weigh the classes in what
             false measurements report, if that is not given.
-        reports: names of the classes that the sensor reports; () if it reports none.
+        reports: names of the classes that the sensor reports, or () if it reports none.
         confusion: for each class of target the probability of each report, which sum to 1.
-        clutter_confusion: the same for false measurements; (): as targets.
-        sizes: for each class of target mean and standard deviation of the measured size, m; () without sizes.
-        clutter_size: the same for false measurements; (): as targets.
+        clutter_confusion: the same for false measurements. (): as targets.
+        sizes: for each class of target mean and standard deviation of the measured size, m, or () without sizes.
+        clutter_size: the same for false measurements. (): as targets.
 
     Raises:
         InputError: other shapes, probabilities that are negative or do not sum to 1, a deviation that is not positive.
@@ -58,7 +58,7 @@ class ClassFeatures:
     def log_ratios(self, report: int | None = None, size: float | None = None) -> Floats:
         """Return the log likelihood ratio, target over false measurement, for each class, shape (num_classes,).
 
-        report: index in `reports`; size: m; None: not known.
+        report: index in `reports`. size: m. None: not known.
         """
         ratios = np.zeros(len(self.class_probs))
         if report is not None:
@@ -78,7 +78,7 @@ class ClassFeatures:
 
 
 def _bounded(logs: Floats) -> Floats:
-    """Return log ratios within `_STRONGEST`; a report that neither targets nor clutter can have is no evidence."""
+    """Return log ratios within `_STRONGEST`. A report that neither targets nor clutter can have is no evidence."""
     return np.clip(np.nan_to_num(logs, nan=0.0, posinf=_STRONGEST, neginf=-_STRONGEST), -_STRONGEST, _STRONGEST)
 
 

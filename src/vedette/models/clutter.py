@@ -35,12 +35,12 @@ _NUM_TRIAL_SCANS = 8
 
 
 class ClutterSampler(Protocol):
-    """A function that draws one scan of clutter, including the Poisson number; plain Python, not compiled."""
+    """A function that draws one scan of clutter, including the Poisson number, in plain Python, not compiled."""
 
     def __call__(
         self, pose: Floats, measurement: MeasurementModel, *, state_dim: int, rng: np.random.Generator
     ) -> Floats:
-        """Return (n, meas_dim) clutter measurements of a sensor at `pose`; `state_dim` is the length of states."""
+        """Return (n, meas_dim) clutter measurements of a sensor at `pose`. `state_dim` is the length of states."""
         ...
 
 
@@ -50,11 +50,11 @@ class ClutterModel:
 
     Attributes:
         rate: expected number of clutter measurements per scan.
-        log_intensity: model function of kind `log_clutter_intensity`; it integrates to `rate` over measurement space.
+        log_intensity: model function of kind `log_clutter_intensity`. It integrates to `rate` over measurement space.
         params: its parameter vector.
-        sampler: draws a scan of clutter, see `ClutterSampler`; None if no scans are simulated.
-        meas_dim: number of measurement components; None: not known.
-        angular: (meas_dim,) flags of the components that are angles; None: not known.
+        sampler: draws a scan of clutter, see `ClutterSampler`. None if no scans are simulated.
+        meas_dim: number of measurement components. None: not known.
+        angular: (meas_dim,) flags of the components that are angles. None: not known.
     """
 
     rate: float
@@ -191,7 +191,7 @@ def plane_params(kind: str, max_range_rate: float | None, max_height: float | No
 
 @inlined
 def log_density_of_rate(measurement: Floats, params: Floats) -> float:
-    """Log density of the third component, a range rate, in s/m: uniform; 0 if it is missing.
+    """Log density of the third component, a range rate, in s/m: uniform, or 0 if it is missing.
 
     params: end with `plane_params`.
     """
@@ -213,7 +213,7 @@ def angular_of(kind: str) -> Bools:
 
 
 def log_or_minus_infinity(value: float) -> float:
-    """Return log(value); -inf at zero."""
+    """Return log(value), or -inf at zero."""
     return math.log(value) if value > 0.0 else -math.inf
 
 
@@ -225,10 +225,10 @@ def measurement_space_clutter(
 
     Args:
         rate: expected number per scan.
-        low: (meas_dim,) lowest value of each measurement component; a bearing in radians [rad, m].
-        high: (meas_dim,) highest value of each measurement component; a bearing in radians [rad, m].
+        low: (meas_dim,) lowest value of each measurement component, a bearing in radians [rad, m].
+        high: (meas_dim,) highest value of each measurement component, a bearing in radians [rad, m].
         angular: (meas_dim,) which components are angles. Their bounds may then lie anywhere on the circle, such as
-            0 to 2 pi; without it, bounds of an angle must lie in [-pi, pi], where measured angles are.
+            0 to 2 pi. Without it, bounds of an angle must lie in [-pi, pi], where measured angles are.
     """
     rate = non_negative("rate", rate)
     lows = float_array("low", low, (None,))

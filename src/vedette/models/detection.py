@@ -26,9 +26,9 @@ class DetectionModel:
         function: model function of kind `prob_detection`.
         params: its parameter vector.
         mean_function: model function of kind `mean_prob_detection` (same parameters): the mean over a Gaussian in
-            closed form; None: it is computed with nodes, see `SensorModel.detection_at`.
+            closed form. None: it is computed with nodes, see `SensorModel.detection_at`.
         reach: distance in m from the sensor beyond which the probability is 0, so that evaluations there can be
-            skipped; inf: no such distance is known.
+            skipped. inf: no such distance is known.
     """
 
     function: ModelFunction
@@ -84,17 +84,17 @@ def constant_detection(prob_detection: Probability) -> DetectionModel:
     """The same probability of detection everywhere.
 
     Args:
-        prob_detection: probability of detection; 1 is replaced by `MAX_PROB_DETECTION`.
+        prob_detection: probability of detection. 1 is replaced by `MAX_PROB_DETECTION`.
     """
     return DetectionModel(functions.constant, np.array([_guarded(prob_detection)]), functions.mean_constant)
 
 
 @part("gaussian", "detection")
 def gaussian_detection(sigma: Positive = 10000.0) -> DetectionModel:
-    """Probability of detection exp(-d^2 / (2 sigma^2)) at distance d (paper section IV; paper-notes 4).
+    """Probability of detection exp(-d^2 / (2 sigma^2)) at distance d (paper section IV, paper-notes 4).
 
     Args:
-        sigma: length scale of the decrease with distance; the probability is capped at `MAX_PROB_DETECTION` [m].
+        sigma: length scale of the decrease with distance. The probability is capped at `MAX_PROB_DETECTION` [m].
     """
     return DetectionModel(functions.gaussian, np.array([positive("sigma", sigma)]), functions.mean_gaussian)
 
@@ -104,7 +104,7 @@ def limited_range(prob_detection: Probability, max_range: Positive, outside: Pro
     """Detection within a distance, and less or none beyond.
 
     Args:
-        prob_detection: probability of detection within `max_range`; 1 is replaced by `MAX_PROB_DETECTION`.
+        prob_detection: probability of detection within `max_range`. 1 is replaced by `MAX_PROB_DETECTION`.
         max_range: greatest distance [m].
         outside: probability of detection beyond it.
     """
@@ -116,10 +116,10 @@ def limited_range(prob_detection: Probability, max_range: Positive, outside: Pro
 def limited_sector(
     prob_detection: Probability, max_range: Positive, half_width_rad: HalfWidth, outside: Probability = 0.0
 ) -> DetectionModel:
-    """Detection within a distance and a sector (field of view) around the sensor's heading; less or none beyond.
+    """Detection within a distance and a sector (field of view) around the sensor's heading, less or none beyond.
 
     Args:
-        prob_detection: probability of detection within the sector; 1 is replaced by `MAX_PROB_DETECTION`.
+        prob_detection: probability of detection within the sector. 1 is replaced by `MAX_PROB_DETECTION`.
         max_range: greatest distance [m].
         half_width_rad: greatest angle from the heading, either side, up to a half turn [rad].
         outside: probability of detection outside the sector.
@@ -150,13 +150,13 @@ def soft_sector(
     rho and the angle dtheta from the heading. A target at the sensor itself is straight ahead.
 
     Args:
-        prob_detection: probability of detection deep within the sector, p; 1 is replaced by
+        prob_detection: probability of detection deep within the sector, p. 1 is replaced by
             `MAX_PROB_DETECTION`.
         max_range: distance at which half of it is left, straight ahead [m].
-        half_width_rad: angle from the heading, either side, at which half of it is left; with a half turn and no
+        half_width_rad: angle from the heading, either side, at which half of it is left. With a half turn and no
             `angle_slope` detection does not depend on the angle [rad].
         range_slope: steepness of the edge in range [1/m].
-        angle_slope: steepness of the edges in angle; none: sharp ones, and at a half turn none at all [1/rad].
+        angle_slope: steepness of the edges in angle. none: sharp ones, and at a half turn none at all [1/rad].
         hard_limit: True if there is no detection beyond `max_range` and the half width.
     """
     slope = 0.0 if angle_slope is None else positive("angle_slope", angle_slope)
@@ -176,11 +176,11 @@ def camera(
     The pose is [px, py, heading_rad, pointing_rad, half_width_rad], see `vedette.platforms.Pointing`.
 
     Args:
-        prob_detection: probability of detection within the field of view; 1 is replaced by
+        prob_detection: probability of detection within the field of view. 1 is replaced by
             `MAX_PROB_DETECTION`.
         max_range: greatest distance [m].
-        reference_half_width_rad: half width of a zooming camera at which its range is `max_range`; the range is
-            inversely proportional to the half width; none: the same range at every width [rad].
+        reference_half_width_rad: half width of a zooming camera at which its range is `max_range`. The range is
+            inversely proportional to the half width. none: the same range at every width [rad].
     """
     given = reference_half_width_rad
     reference = 0.0 if given is None else half_width("reference_half_width_rad", given)

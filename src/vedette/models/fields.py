@@ -45,7 +45,7 @@ def _portion(field: str, value: Any) -> float:
 
 
 def half_width(field: str, value: Any) -> float:
-    """Return the value as half the angle of a sector; it must be in (0, pi] rad."""
+    """Return the value as half the angle of a sector. It must be in (0, pi] rad."""
     if positive(field, value) > math.pi:
         raise reject(field, "an angle in radians, in (0, pi] (is it in degrees?)", value)
     return float(value)
@@ -90,7 +90,7 @@ NonNegativePair: TypeAlias = ArrayLike
 def part(kind: str, room: str, **names: str) -> Callable[[T], T]:
     """Mark a class or a function as the part that `kind` selects in a section (`room`) of a scenario, such as "search".
 
-    names: fields or parameters with another name in a file, by their key; an angle whose key ends in `_deg` is in
+    names: fields or parameters with another name in a file, by their key. An angle whose key ends in `_deg` is in
     degrees there.
     """
 
@@ -101,10 +101,10 @@ def part(kind: str, room: str, **names: str) -> Callable[[T], T]:
 
 
 def check_fields(made: Any, prefix: str = "") -> None:
-    """Check the fields of a dataclass against their types; optional fields may be None.
+    """Check the fields of a dataclass against their types. Optional fields may be None.
 
     Raises:
-        InputError: an invalid field; the message has its name, the expected and the given value.
+        InputError: an invalid field. The message has its name, the expected and the given value.
     """
     kind: type = type(made)
     for name, field, optional, check in _checks(kind, prefix):

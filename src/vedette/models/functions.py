@@ -16,11 +16,11 @@ both. `out` has arbitrary contents: **every** entry must be written, zeros too.
 | `prob_detection` | state, pose, params | probability in [0, 1] |
 | `mean_prob_detection` | mean, cov, pose, params | mean of `prob_detection` over states N(mean, cov) |
 | `label_reward` | existence, mean, cov, the same of the update, params, out | out: what a target adds to a reward |
-| `association_marginals` | offsets, columns, log_weights, params, out | out: log probabilities; see `CustomMarginals` |
+| `association_marginals` | offsets, columns, log_weights, params, out | out: log probabilities, see `CustomMarginals` |
 | `log_clutter_intensity` | measurement, pose, params | log of the expected clutter per unit of measurement space |
 
-`state[0:2]` is always the position in metres; `pose` is [px, py, heading_rad] and further components of the
-platform; `params` is the model's parameter vector.
+`state[0:2]` is always the position in metres. `pose` is [px, py, heading_rad] and further components of the
+platform. `params` is the model's parameter vector.
 """
 
 from __future__ import annotations
@@ -47,7 +47,7 @@ def model_function(kind: str) -> Callable[[Callable[..., Any]], ModelFunction]:
 
     Raises:
         InputError: an unknown kind, an object that is not a plain function, or a wrong number of arguments.
-        ModelError: the body cannot be compiled; the message has the place.
+        ModelError: the body cannot be compiled. The message has the place.
     """
     if kind not in SIGNATURES:
         raise reject("model function kind", f"one of {', '.join(SIGNATURES)}", kind)
@@ -86,7 +86,7 @@ def describe(function: ModelFunction, *args: Any) -> str:
 
 
 def call(function: ModelFunction, *args: Any) -> Any:
-    """Call a model function; any exception becomes a `ModelError` that names the function and its arguments."""
+    """Call a model function. Any exception becomes a `ModelError` that names the function and its arguments."""
     try:
         return function(*args)
     except Exception as error:
@@ -106,7 +106,7 @@ def write_rows(function: ModelFunction, states: Floats, at: Floats | float, para
 
 
 def numbers_at(function: ModelFunction, states: Floats, at: Floats | float, params: Floats) -> Floats:
-    """Numbers that a model function returns at (n, state_dim) states, (n,); `at` and errors as in `write_rows`."""
+    """Numbers that a model function returns at (n, state_dim) states, (n,), with `at` and errors as in `write_rows`."""
     try:
         return numbers_of_rows(function, states, at, params)
     except Exception:

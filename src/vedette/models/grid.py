@@ -26,7 +26,7 @@ class CellGrid:
         rows: number of cells from south to north.
 
     Raises:
-        InputError: an invalid field; the message has its name, the expected and the given value.
+        InputError: an invalid field. The message has its name, the expected and the given value.
     """
 
     region: Region
@@ -41,7 +41,7 @@ class CellGrid:
 
     @classmethod
     def covering(cls, region: Region, cell_size: float) -> CellGrid:
-        """Return the grid with the fewest cells of at most `cell_size` m (above 0) per side; may raise `InputError`."""
+        """Return the grid with the fewest cells of at most `cell_size` m (above 0) per side. May raise `InputError`."""
         size = positive("cell_size", cell_size)
         instance("region", region, Region)
         width, height = region.x_max - region.x_min, region.y_max - region.y_min
@@ -70,8 +70,8 @@ class CellGrid:
         """Return states at rest at the nodes of each cell, (num_cells, num_nodes, state_dim).
 
         Args:
-            state_dim: length of a state; its first two components are the position, the others 0.
-            nodes_a_side: number of Gauss-Legendre nodes along each side of a cell; num_nodes is its square.
+            state_dim: length of a state. Its first two components are the position, the others 0.
+            nodes_a_side: number of Gauss-Legendre nodes along each side of a cell. `num_nodes` is its square.
 
         Raises:
             InputError: a `state_dim` below 2, or no nodes.
@@ -88,7 +88,7 @@ class CellGrid:
         return states.reshape(self.num_cells, nodes_a_side**2, state_dim)
 
     def cells_at(self, states: Floats) -> Ints:
-        """Return the cell of each of (n, 2 or more) states, (n,); -1 outside of the region."""
+        """Return the cell of each of (n, 2 or more) states, (n,), or -1 outside of the region."""
         corner, size = (self.region.x_min, self.region.y_min), np.array(self.cell_size)
         column, row = np.floor((states[:, :2] - corner) / size).astype(np.int64).T
         inside = (column >= 0) & (column < self.columns) & (row >= 0) & (row < self.rows)
@@ -96,13 +96,13 @@ class CellGrid:
 
     @staticmethod
     def node_weights(nodes_a_side: int = 3) -> Floats:
-        """Return the weights of the nodes of `states` in a mean over a cell, (num_nodes,); they sum to 1."""
+        """Return the weights of the nodes of `states` in a mean over a cell, (num_nodes,). They sum to 1."""
         _, weights = np.polynomial.legendre.leggauss(dimension("nodes_a_side", nodes_a_side))
         return np.outer(weights, weights).ravel() / 4.0
 
     @property
     def border(self) -> Floats:
-        """Length of the region's border along each cell in m, (num_cells,); 0 for inner cells."""
+        """Length of the region's border along each cell in m, (num_cells,), or 0 for inner cells."""
         width, height = self.cell_size
         lengths = np.zeros((self.rows, self.columns))
         for edge, length in (

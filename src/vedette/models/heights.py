@@ -1,7 +1,7 @@
 """Built-in measurements of targets with a height: slant ranges, elevations and altitudes.
 
 States are [px, py, vx, vy, pz, vz] (`constant_velocity_height`). The plane is flat, and heights are above it, in m. The
-height of a sensor is component 10 of its pose; with a shorter pose it is 0. With offsets dx, dy, dz of the target from
+height of a sensor is component 10 of its pose. With a shorter pose it is 0. With offsets dx, dy, dz of the target from
 the sensor when the beam passes it, and g = sqrt(dx^2 + dy^2):
 
     bearing = atan2(dy, dx),  slant range = sqrt(g^2 + dz^2),  elevation = atan2(dz, g),  altitude = pz.
@@ -31,7 +31,7 @@ def _height_at_beam(state: Floats, at: Passage) -> float:
 
 @inlined
 def _write_bearing_range(state: Floats, pose: Floats, out: Floats) -> tuple[float, float]:
-    """Write bearing and slant range; return ground range and height above the sensor."""
+    """Write bearing and slant range, and return ground range and height above the sensor."""
     at = passage(state, pose)
     ground, up = math.sqrt(at.dx * at.dx + at.dy * at.dy), _height_at_beam(state, at) - own_height(pose)
     out[0] = math.atan2(at.dy, at.dx)
@@ -41,7 +41,7 @@ def _write_bearing_range(state: Floats, pose: Floats, out: Floats) -> tuple[floa
 
 @inlined
 def _write_slopes(state: Floats, pose: Floats, out: Floats) -> tuple[Passage, float, float]:
-    """Write the derivatives of bearing and slant range at the passage; return it, ground range and height above."""
+    """Write the derivatives of bearing and slant range at the passage, and return it, ground range and height above."""
     at = passage(state, pose)
     square, up = at.dx * at.dx + at.dy * at.dy, _height_at_beam(state, at) - own_height(pose)
     distance = math.sqrt(square + up * up)
@@ -143,7 +143,7 @@ PLACES_WITH_HEIGHT = {"bearing_range_elevation": _at_elevation, "bearing_range_a
 
 @part("bearing_slant_range", "measurement")
 def bearing_slant_range() -> MeasurementModel:
-    """z = [bearing in rad, slant range in m] of a radar that measures no heights; two radars' ranges determine them.
+    """z = [bearing in rad, slant range in m] of a radar that measures no heights. Two radars' ranges determine them.
 
     A track starts at a height of 5 km, because one range does not determine it. States are [px, py, vx, vy, pz, vz].
     """
@@ -167,6 +167,6 @@ def bearing_range_altitude() -> MeasurementModel:
 
 @part("position_altitude", "measurement")
 def position_altitude() -> MeasurementModel:
-    """z = [px, py, pz] of the target in m; the sensor's pose has no effect. States are [px, py, vx, vy, pz, vz]."""
+    """z = [px, py, pz] of the target in m. The sensor's pose has no effect. States are [px, py, vx, vy, pz, vz]."""
     functions = _position_altitude, np.empty(0), _position_altitude_jacobian
     return MeasurementModel(3, *functions, places=_at_position, is_linear=True, components=("x", "y", "altitude"))

@@ -1,7 +1,7 @@
 """Built-in motion models: nearly constant velocity, also with height, and the coordinated turn, for any time step.
 
-States are [px, py, vx, vy] (the order of the paper's F and Q; paper-notes 1). The coordinated turn appends a turn rate
-in rad/s, positive to the left; the model with height appends height and vertical velocity.
+States are [px, py, vx, vy] (the order of the paper's F and Q, paper-notes 1). The coordinated turn appends a turn rate
+in rad/s, positive to the left. The model with height appends height and vertical velocity.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ _SERIES_ANGLE = 0.1
 
 @inlined
 def _acceleration_cov(dt: float, sigma_v: float, out: Floats) -> None:
-    """Write the covariance of positions and velocities for an acceleration constant within the step; zero elsewhere."""
+    """Write the covariance of positions and velocities for an acceleration constant within the step, zero elsewhere."""
     variance = sigma_v * sigma_v
     for i in range(out.shape[0]):
         for j in range(out.shape[1]):
@@ -91,10 +91,10 @@ def constant_velocity(
     step of their total length.
 
     Args:
-        sigma_v: standard deviation of the acceleration (paper: 5); under continuous_white the root of its spectral
+        sigma_v: standard deviation of the acceleration (paper: 5), or under continuous_white the root of its spectral
             density, in m/s^1.5 [m/s^2].
         noise_model: discrete_white: the acceleration is constant within a step, as in the paper, and independent
-            between steps; continuous_white: it is white in continuous time.
+            between steps. continuous_white: it is white in continuous time.
         method: Gaussian method, see `MotionModel`.
     """
     one_of("noise_model", noise_model, _CV_NOISE)

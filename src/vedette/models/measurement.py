@@ -44,7 +44,7 @@ def _places(measurements: Floats, pose: Floats) -> Floats:
 
 @part("position", "measurement")
 def position() -> MeasurementModel:
-    """z = [px, py] of the target in m, in the frame of the region; the sensor's pose has no effect."""
+    """z = [px, py] of the target in m, in the frame of the region. The sensor's pose has no effect."""
     functions = _position, np.empty(0), _position_jacobian
     return MeasurementModel(2, *functions, places=_places, is_linear=True, components=("x", "y"))
 
@@ -53,7 +53,7 @@ _ANGLES = np.array([FULL_TURN])
 
 
 def angular_flags(name: str, angular: Sequence[bool] | Bools, meas_dim: int) -> Bools:
-    """Return the flags of the components that are angles, (meas_dim,); an empty `angular` means no angles."""
+    """Return the flags of the components that are angles, (meas_dim,). An empty `angular` means no angles."""
     flags = np.array(angular)
     if flags.size == 0:
         return np.zeros(meas_dim, np.bool_)
@@ -63,7 +63,7 @@ def angular_flags(name: str, angular: Sequence[bool] | Bools, meas_dim: int) -> 
 
 
 def wrap_angles(angles: Floats) -> Floats:
-    """Return the angles wrapped to (-pi, pi]; angles already in it keep every bit."""
+    """Return the angles wrapped to (-pi, pi]. Angles already in it keep every bit."""
     wrapped = np.array(angles, dtype=np.float64, order="C")
     wrap_columns(wrapped.reshape(-1, 1), _ANGLES)
     return wrapped
@@ -83,21 +83,21 @@ class MeasurementModel:
     Attributes:
         meas_dim: number of components of a measurement.
         function: model function of kind `measurement`.
-        params: its parameter vector; anything array-like is converted.
+        params: its parameter vector. Anything array-like is converted.
         jacobian: model function of kind `measurement_jacobian` (same parameters), or None: sigma points are used.
-        angular: one boolean per component, true for an angle in radians; () means that `components` determines them,
+        angular: one boolean per component, true for an angle in radians. () means that `components` determines them,
             else that there are no angles. Residuals of angles are wrapped to (-pi, pi].
-        least: (meas_dim,) smallest value of each component without noise, such as 0 for a range; () means that
+        least: (meas_dim,) smallest value of each component without noise, such as 0 for a range. () means that
             `components` determines them, else that there are no limits.
         periods: (meas_dim,) interval after which a component repeats, such as twice the largest unambiguous range rate
-            of a Doppler radar; residuals are wrapped to half of it either way. inf: it does not repeat; () means 2 pi
+            of a Doppler radar. Residuals are wrapped to half of it either way. inf: it does not repeat. () means 2 pi
             for angles, inf for others.
         places: plain function of (n, meas_dim) measurements and a pose: the (n, 2) positions of the targets in m, or
-            (n, 3) with heights for states [px, py, vx, vy, pz, vz]; None if a measurement determines no position.
+            (n, 3) with heights for states [px, py, vx, vy, pz, vz]. None if a measurement determines no position.
             Births from measurements need it.
         is_linear: True if measurements are linear in the state: a Jacobian is then exact for Gaussians of any width.
         components: name of the quantity of each component, such as "bearing", "range", "range_rate", "x" or "y" (the
-            names of `vedette.internal.quantities.QUANTITIES`, which are also fields of `Bias`); () for other
+            names of `vedette.internal.quantities.QUANTITIES`, which are also fields of `Bias`). () for other
             quantities.
 
     Raises:
@@ -164,7 +164,7 @@ class MeasurementModel:
         return self._located(measurements, pose)[:, :2]
 
     def states_at(self, measurements: Floats, pose: ArrayLike, state_dim: int) -> Floats:
-        """Return (n, state_dim) states at rest where (n, meas_dim) measurements were taken; raises like `positions`.
+        """Return (n, state_dim) states at rest where (n, meas_dim) measurements were taken. Raises like `positions`.
 
         Rows may bring their noise (`vedette.models.with_row_noise`).
         """
@@ -186,7 +186,7 @@ class MeasurementModel:
             raise ModelError(f"places of measurements at pose {at}: {type(error).__name__}: {error}") from error
 
     def check(self, states: ArrayLike, pose: ArrayLike) -> None:
-        """Check the functions at each state; `ModelError` has the function, the state, the expected and given value."""
+        """Check the functions at each state. `ModelError` has the function, the state, the expected and given value."""
         at = pose_vector("pose", pose)
         for state in state_table("states", states):
             args = (state, at, self.params)
@@ -202,8 +202,8 @@ class NoiseModel:
     Attributes:
         function: model function of kind `measurement_noise_cov`.
         params: its parameter vector.
-        meas_dim: number of measurement components; None: any, or not known.
-        least_stds: (meas_dim,) smallest standard deviation of each component, used to detect numbers in a wrong unit;
+        meas_dim: number of measurement components. None: any, or not known.
+        least_stds: (meas_dim,) smallest standard deviation of each component, used to detect numbers in a wrong unit.
             None: not known.
     """
 
@@ -230,7 +230,7 @@ class NoiseModel:
         return out
 
     def check(self, states: ArrayLike, pose: ArrayLike, meas_dim: int) -> None:
-        """Check the function at each state; raise `ModelError` unless it gives a positive definite covariance."""
+        """Check the function at each state, and raise `ModelError` unless it gives a positive definite covariance."""
         at = pose_vector("pose", pose)
         for state in state_table("states", states):
             probe_covariance(self.function, (state, at, self.params), meas_dim, definite=True)

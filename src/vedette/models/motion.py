@@ -21,7 +21,7 @@ METHODS = {"ekf": LINEARISED, "ukf": UNSCENTED, "ckf": CUBATURE}
 
 
 def resolve_method(name: str, method: str, has_jacobian: bool, *, bends: bool = False) -> int:
-    """Return the kernel's number of a Gaussian method; "auto" is the EKF if there is a Jacobian, else the UKF.
+    """Return the kernel's number of a Gaussian method. "auto" is the EKF if there is a Jacobian, else the UKF.
 
     bends: True if "auto" may linearise again at each measurement, with a Jacobian.
 
@@ -49,10 +49,10 @@ class MotionModel:
     """Markov motion of one target over any time step (paper: the transition density f(x_k | x_k-1)).
 
     Attributes:
-        state_dim: length of the state; state[0:2] is the position in metres, state[2:4] if it exists the velocity.
+        state_dim: length of the state: state[0:2] is the position in m, state[2:4] if it exists the velocity.
         transition: model function of kind `transition`.
         process_noise_cov: model function of kind `process_noise_cov`.
-        transition_params, noise_params: parameter vectors of the two functions; anything array-like is converted.
+        transition_params, noise_params: parameter vectors of the two functions. Anything array-like is converted.
         transition_jacobian: model function of kind `transition_jacobian`, or None.
         method: "auto" (EKF if there is a Jacobian, else UKF), "ekf", "ukf" or "ckf".
 
@@ -79,7 +79,7 @@ class MotionModel:
         resolve_method("MotionModel.method", self.method, self.transition_jacobian is not None)
 
     def propagate(self, states: ArrayLike, dt: float) -> Floats:
-        """Return the states after `dt` seconds without process noise, (n, state_dim); one state may be a vector.
+        """Return the states after `dt` seconds without process noise, (n, state_dim). One state may be a vector.
 
         Raises:
             ModelError: the transition function raised.
@@ -105,7 +105,7 @@ class MotionModel:
         return out
 
     def velocity_fault(self) -> str | None:
-        """Return in words why components 2 and 3 are not the velocity along x and y; None if they are, or do not exist.
+        """Return in words why components 2 and 3 are not the velocity along x and y. None if they are, or do not exist.
 
         Births, regions and outputs take them for it: in a state [x, vx, y, vy] they would read y as a velocity. Raises
         `ModelError` if the transition function does.
@@ -129,7 +129,7 @@ class MotionModel:
         """Check every function at each state, and the order of the components.
 
         Raises:
-            ModelError: an invalid result; the message has the function, the state, the expected and the given value.
+            ModelError: an invalid result. The message has the function, the state, the expected and the given value.
         """
         dt = positive("dt", dt)
         shape = (self.state_dim, self.state_dim)
@@ -166,7 +166,7 @@ class SurvivalModel:
         return numbers_at(self.function, table, real("dt", dt), self.params)
 
     def check(self, states: ArrayLike, dt: float = 1.0) -> None:
-        """Check the function at each state; raise `ModelError` unless it gives a probability."""
+        """Check the function at each state, and raise `ModelError` unless it gives a probability."""
         dt = positive("dt", dt)
         for state in state_table("states", states):
             probe_probability(self.function, (state, dt, self.params))
@@ -174,7 +174,7 @@ class SurvivalModel:
 
 @lru_cache(maxsize=1000)
 def kernel_motion(motion: MotionModel, survival: SurvivalModel) -> Motion:
-    """Return the functions and parameters for prediction kernels; the same object for the same two models."""
+    """Return the functions and parameters for prediction kernels, the same object for the same two models."""
     jacobian = motion.transition_jacobian
     return Motion(
         motion.transition,
@@ -203,9 +203,9 @@ def constant_survival(prob_survival: Probability = 0.98, period: Positive | None
     """The same probability of survival everywhere.
 
     Args:
-        prob_survival: probability of surviving until the next scan (paper: 0.98), or through the period; over dt
+        prob_survival: probability of surviving until the next scan (paper: 0.98), or through the period. Over dt
             seconds it is then prob_survival^(dt / period), in any number of steps.
-        period: time to which the probability refers; none: one scan interval of any length [s].
+        period: time to which the probability refers. none: one scan interval of any length [s].
 
     Raises:
         InputError: a number that is not a probability, or a period that is not above 0.

@@ -76,7 +76,7 @@ def constant_noise(stds: Positives) -> NoiseModel:
     """Independent noise with the same standard deviations everywhere.
 
     Args:
-        stds: standard deviation of each measurement component; a bearing in radians [rad, m].
+        stds: standard deviation of each measurement component, a bearing in radians [rad, m].
     """
     values = float_array("stds", stds, (None,))
     if len(values) == 0 or (values <= 0.0).any():
@@ -109,7 +109,7 @@ def range_dependent_noise(
     sigma_elevation: float | None = None,
     sigma_altitude: float | None = None,
 ) -> NoiseModel:
-    """Noise that grows with the distance d of the target (paper section IV; paper-notes 3).
+    """Noise that grows with the distance d of the target (paper section IV, paper-notes 3).
 
     The standard deviations are sigma_range + eta_range d^2 and sigma_bearing + eta_bearing d. With only `sigma_bearing`
     the model is for bearing-only sensors, with only `sigma_range` for range-only sensors, and with both for [bearing,
@@ -147,7 +147,7 @@ def range_dependent_noise(
 
 
 def _growth(component: str, sigma: float | None, eta: float) -> list[float]:
-    """Return [sigma, eta] of one component; empty if the sensor does not measure it."""
+    """Return [sigma, eta] of one component, empty if the sensor does not measure it."""
     if sigma is not None:
         return [positive(f"sigma_{component}", sigma), non_negative(f"eta_{component}", eta)]
     if eta != 0.0:

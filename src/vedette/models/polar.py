@@ -1,6 +1,6 @@
 """Built-in measurements of bearings, ranges and range rates.
 
-A bearing is atan2(dy, dx) from the +x axis in (-pi, pi] rad, not relative to the heading (paper-notes 2); a range
+A bearing is atan2(dy, dx) from the +x axis in (-pi, pi] rad, not relative to the heading (paper-notes 2). A range
 is in metres. A range rate is the time derivative of the range in m/s: the component of the target's velocity relative
 to the sensor along the line of sight, positive if the target moves away. A target exactly at the sensor has no
 bearing and no line of sight: its range rate is 0 and its Jacobian rows are zero, so that such a measurement has no
@@ -127,24 +127,24 @@ def _places(measurements: Floats, pose: Floats) -> Floats:
 
 @part("bearing_range", "measurement")
 def bearing_range() -> MeasurementModel:
-    """z = [bearing in rad, range in m] (paper: z_k); the bearing counter-clockwise from east, in (-pi, pi]."""
+    """z = [bearing in rad, range in m] (paper: z_k), with the bearing counter-clockwise from east, in (-pi, pi]."""
     functions = _bearing_range, np.empty(0), _bearing_range_jacobian
     return MeasurementModel(2, *functions, places=_places, components=("bearing", "range"))
 
 
 @part("bearing_range_rate", "measurement")
 def bearing_range_rate(max_unambiguous_range_rate: Positive | None = None) -> MeasurementModel:
-    """z = [bearing in rad, range in m, range rate in m/s] of a Doppler radar; positive if the range grows.
+    """z = [bearing in rad, range in m, range rate in m/s] of a Doppler radar, positive if the range grows.
 
     The range rate is relative to the sensor. The sensor's velocity in m/s is in components 6 and 7 of its pose, after
-    the components of cameras and budgets; a sensor with a shorter pose is at rest. States are [px, py, vx, vy, ...].
+    the components of cameras and budgets. A sensor with a shorter pose is at rest. States are [px, py, vx, vy, ...].
 
     Range rates folded at v are measured modulo 2 v, in (-v, v]. Residuals are wrapped to that interval. A range rate
-    counts once three predicted standard deviations are within v; it also gives a new track its velocity only then.
+    counts once three predicted standard deviations are within v. It also gives a new track its velocity only then.
 
     Args:
         max_unambiguous_range_rate: v of range rates that are folded, wavelength times pulse repetition
-            frequency over 4; none: they are not folded [m/s].
+            frequency over 4. none: they are not folded [m/s].
     """
     functions = _bearing_range_rate, np.empty(0), _bearing_range_rate_jacobian
     folded = max_unambiguous_range_rate

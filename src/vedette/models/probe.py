@@ -32,7 +32,7 @@ def _copies(args: tuple[Any, ...]) -> tuple[Any, ...]:
 
 
 def _check_indices(function: ModelFunction, args: tuple[Any, ...]) -> None:
-    """Raise `ModelError` for an index out of range; ignore other exceptions, since 1 / 0 is inf in compiled code."""
+    """Raise `ModelError` for an index out of range. Ignore other exceptions, since 1 / 0 is inf in compiled code."""
     plain = getattr(function, "py_func", function)
     try:
         with np.errstate(all="ignore"):
@@ -56,7 +56,7 @@ def _checked_call(function: ModelFunction, *args: Any) -> Any:
 
 
 def probe_array(function: ModelFunction, args: tuple[Any, ...], shape: tuple[int, ...]) -> Floats:
-    """Return the `out` of `shape` that `function(*args, out)` writes; every entry must be written and finite."""
+    """Return the `out` of `shape` that `function(*args, out)` writes. Every entry must be written and finite."""
     out = np.full(shape, np.nan)
     _checked_call(function, *args, out)
     if not np.isfinite(out).all():
@@ -65,7 +65,7 @@ def probe_array(function: ModelFunction, args: tuple[Any, ...], shape: tuple[int
 
 
 def probe_covariance(function: ModelFunction, args: tuple[Any, ...], dim: int, *, definite: bool) -> Floats:
-    """Return the covariance that a function writes; it must be symmetric and positive definite (or semidefinite)."""
+    """Return the covariance that a function writes. It must be symmetric and positive definite (or semidefinite)."""
     cov = probe_array(function, args, (dim, dim))
     scale = np.abs(cov).max()
     if np.abs(cov - cov.T).max() > SYMMETRY_TOLERANCE * scale:
@@ -83,7 +83,7 @@ def probe_covariance(function: ModelFunction, args: tuple[Any, ...], dim: int, *
 
 
 def probe_probability(function: ModelFunction, args: tuple[Any, ...]) -> float:
-    """Return the value of a probability function; it must be in [0, 1]."""
+    """Return the value of a probability function. It must be in [0, 1]."""
     value = float(_checked_call(function, *args))
     if not 0.0 <= value <= 1.0:
         raise _fault(function, args, "a probability in [0, 1]", value)
@@ -91,7 +91,7 @@ def probe_probability(function: ModelFunction, args: tuple[Any, ...]) -> float:
 
 
 def probe_log_intensity(function: ModelFunction, args: tuple[Any, ...]) -> float:
-    """Return the value of a log intensity function; it must be below +inf, and -inf means no clutter there."""
+    """Return the value of a log intensity function. It must be below +inf, and -inf means no clutter there."""
     value = float(_checked_call(function, *args))
     if math.isnan(value) or value == math.inf:
         raise _fault(function, args, "a log intensity below +inf", value)

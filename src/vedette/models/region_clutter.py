@@ -40,7 +40,7 @@ def _inside(x: float, y: float, params: Floats) -> bool:
 
 @kernel
 def _clip_ray(start: float, slope: float, low: float, high: float, near: float, far: float) -> tuple[float, float]:
-    """Return the part of [near, far] in which start + slope * t lies in [low, high]; empty if near > far."""
+    """Return the part of [near, far] in which start + slope * t lies in [low, high], empty if near > far."""
     if slope == 0.0:
         return (near, far) if low <= start <= high else (1.0, 0.0)
     first, second = (low - start) / slope, (high - start) / slope
@@ -49,7 +49,7 @@ def _clip_ray(start: float, slope: float, low: float, high: float, near: float, 
 
 @kernel
 def _arc_in_quadrant(radius: float, x_low: float, x_high: float, y_low: float, y_high: float) -> float:
-    """Return the angle within [0, pi/2] over which radius * (cos, sin) lies in the box; both are monotone there."""
+    """Return the angle within [0, pi/2] over which radius * (cos, sin) lies in the box. Both are monotone there."""
     if x_high < 0.0 or y_high < 0.0 or x_low > radius or y_low > radius:
         return 0.0
     start = max(math.acos(min(x_high / radius, 1.0)), math.asin(max(y_low / radius, 0.0)))
@@ -223,7 +223,7 @@ def region_clutter(
     max_range_rate: Positive | None = None,
     max_height: Positive | None = None,
 ) -> ClutterModel:
-    """Poisson clutter, uniform over the surveillance region (paper section IV; paper-notes 5).
+    """Poisson clutter, uniform over the surveillance region (paper section IV, paper-notes 5).
 
     Clutter is drawn by applying the sensor's measurement function to uniform positions at rest. Range rates are
     uniform from -max_range_rate to max_range_rate, and heights from 0 to max_height.
@@ -233,9 +233,9 @@ def region_clutter(
         region: the surveillance region.
         kind: kind of measurement, a key of `vedette.internal.quantities.COMPONENTS`. For other measurements, use a
             `ClutterModel` with a custom log intensity and sampler.
-        max_range_rate: largest range rate of a false measurement, either way, where range rates are measured; none: 300
+        max_range_rate: largest range rate of a false measurement, either way, where range rates are measured. none: 300
             [m/s].
-        max_height: largest height of a false measurement, where heights play a part; none: 12 km [m].
+        max_height: largest height of a false measurement, where heights play a part. none: 12 km [m].
     """
     one_of("kind", kind, _KINDS)
     if not isinstance(region, Region):

@@ -30,14 +30,14 @@ def with_row_noise(
 
     Args:
         measurements: (num, m). A component after the second may be NaN: it was not measured.
-        covs: (num, m, m) covariances of the noise, or (num, m) standard deviations; SI units. A variance of 0 leaves a
-            component to the sensor's noise model.
+        covs: (num, m, m) covariances of the noise, or (num, m) standard deviations, in SI units. A variance of 0
+            leaves a component to the sensor's noise model.
         log_likelihood_ratios: (num,) log ratio of the probability densities of a measurement's features, such as its
-            signal-to-noise ratio, if it is of a target and if it is false; None: 0.
+            signal-to-noise ratio, if it is of a target and if it is false. None: 0.
         added: (num, m, m) covariances in addition to those, or to the sensor's noise model where it holds, such as
-            those of the sensor's own pose; None: 0.
+            those of the sensor's own pose. None: 0.
         log_class_ratios: (num, num_classes) the same ratio as `log_likelihood_ratios`, of further features, for a
-            target of each class of `BirthModel.class_probs`; these are appended to the rows. None: no such features.
+            target of each class of `BirthModel.class_probs`. These are appended to the rows. None: no such features.
 
     Raises:
         InputError: an array of another shape, a number that is not finite, a covariance that is not symmetric and
@@ -85,7 +85,7 @@ class SignalModel:
     Attributes:
         mean_db: mean ratio of targets, d, dB.
         threshold_db: threshold of detection, t, dB.
-        clutter_db: mean power of clutter over that of the noise, c, dB; 0: false measurements are noise.
+        clutter_db: mean power of clutter over that of the noise, c, dB. 0: false measurements are noise.
 
     Raises:
         InputError: a number that is not finite.
@@ -100,7 +100,7 @@ class SignalModel:
             object.__setattr__(self, name, real(f"SignalModel.{name}", getattr(self, name)))
 
     def log_likelihood_ratio(self, snr_db: float) -> float:
-        """Return the log likelihood ratio, target over false measurement, of a ratio in dB; below t that at t."""
+        """Return the log likelihood ratio, target over false measurement, of a ratio in dB, below t that at t."""
         target, threshold, clutter, power = (
             10.0 ** (each / 10.0) for each in (self.mean_db, self.threshold_db, self.clutter_db, snr_db)
         )
@@ -123,7 +123,7 @@ def row_noise(
 
     stds: of each component, 0 for that of the sensor's noise model. missing: of each component, True if it was not
     measured. correlation: of the first two components. added: (m, m) covariance in addition to these, or to that of the
-    noise model. log_class_ratios: of each class; () if the features of classes are not measured.
+    noise model. log_class_ratios: of each class, or () if the features of classes are not measured.
     """
     own = [math.sqrt(MISSING) if gap else std for std, gap in zip(stds, missing, strict=True)]
     covs = [own[a] * own[b] if a == b else 0.0 for a in range(len(own)) for b in range(a + 1)]
@@ -138,7 +138,7 @@ def row_noise(
 
 
 def _sum(covs: Floats, added: Floats) -> Floats:
-    """Return covariances (num, m, m) with others added; a variance left to the noise model is minus what is added."""
+    """Return covariances (num, m, m) with others added. A variance left to the noise model is minus what is added."""
     total = covs + added
     for a in range(covs.shape[1]):
         total[:, a, a] = np.where(covs[:, a, a] > 0.0, total[:, a, a], covs[:, a, a] - added[:, a, a])
@@ -146,7 +146,7 @@ def _sum(covs: Floats, added: Floats) -> Floats:
 
 
 def with_added_noise(scan: Floats, added: Floats) -> Floats:
-    """Return a scan whose noise has covariances (num, m, m) in addition; its rows may bring their noise."""
+    """Return a scan whose noise has covariances (num, m, m) in addition. Its rows may bring their noise."""
     dim = added.shape[1]
     if scan.shape[1] == dim:
         return with_row_noise(scan, np.zeros(added.shape), added=added)

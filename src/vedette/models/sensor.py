@@ -29,7 +29,7 @@ def _no_measurement_jacobian(state: Floats, pose: Floats, params: Floats, out: F
 
 @model_function("mean_prob_detection")
 def _no_mean_detection(mean: Floats, cov: Floats, pose: Floats, params: Floats) -> float:
-    """Placeholder for a missing mean in a kernel bundle that never calls it; returns NaN."""
+    """Placeholder for a missing mean in a kernel bundle that never calls it. Returns NaN."""
     return math.nan
 
 
@@ -51,11 +51,11 @@ class SensorModel:
     Attributes:
         measurement, noise, detection, clutter: the four models.
         method: "ekf", "ukf", "ckf", or "auto": the EKF if measurements are close to linear for their noise, else a
-            separate linearisation for each measurement; the UKF if the measurement has no Jacobian.
+            separate linearisation for each measurement, or the UKF if the measurement has no Jacobian.
         detection_at: filters evaluate the probability of detection at the "centre" of a predicted Gaussian, as in the
             paper, or as its "mean" over the Gaussian, with nodes over the position. With the mean, if P_D varies over
             the Gaussian, a miss moves the density to places of low P_D, and a detection has the mean P_D of the
-            density after it. None: the mean in filters of a factored GLMB, else the centre; the `sensor` of a filter
+            density after it. None: the mean in filters of a factored GLMB, else the centre. The `sensor` of a filter
             has the value in use.
         meas_dim: number of components of a measurement.
 
@@ -91,7 +91,7 @@ class SensorModel:
         self._check_bearings()
 
     def _check_bearings(self) -> None:
-        """Raise `InputError` for a standard deviation of an angle above pi; warn of one that looks like degrees."""
+        """Raise `InputError` for a standard deviation of an angle above pi, and warn of one that looks like degrees."""
         stds = self.noise.least_stds
         if stds is None:
             return
@@ -106,7 +106,7 @@ class SensorModel:
     def to_kernel(self, detection_at: str | None = None) -> Sensor:
         """Return the functions and parameters for kernels.
 
-        detection_at: replaces the sensor's own; "mean" then uses the model's `mean_function`, if it has one.
+        detection_at: replaces the sensor's own. "mean" then uses the model's `mean_function`, if it has one.
         """
         if self.detection.is_constant or (detection_at or self.detection_at or "centre") == "centre":
             return _bundle_of(self, AT_CENTRE)
@@ -138,7 +138,7 @@ class SensorModel:
         unwritten, use indices outside their arrays, or return an invalid value.
 
         Raises:
-            ModelError: an invalid result; the message has the function, the state, the expected and the given value.
+            ModelError: an invalid result. The message has the function, the state, the expected and the given value.
         """
         table, at = state_table("states", states), pose_vector("pose", pose)
         self.measurement.check(table, at)
@@ -150,7 +150,7 @@ class SensorModel:
 
 @lru_cache(maxsize=1000)
 def with_default_detection_at(model: SensorModel, default: str) -> SensorModel:
-    """Return the model with this `detection_at` if it has none; the same object for equal arguments."""
+    """Return the model with this `detection_at` if it has none, the same object for equal arguments."""
     if model.detection_at is not None:
         return model
     with suppress_unit_warnings():  # those of the given model are enough
@@ -159,7 +159,7 @@ def with_default_detection_at(model: SensorModel, default: str) -> SensorModel:
 
 @lru_cache(maxsize=1000)
 def _bundle_of(model: SensorModel, rule: int) -> Sensor:
-    """Return the functions and parameters of a model; cached, since kernels recognise a bundle they have seen."""
+    """Return the functions and parameters of a model, cached, since kernels recognise a bundle they have seen."""
     jacobian, mean = model.measurement.jacobian, model.detection.mean_function
     return Sensor(
         model.measurement.function,

@@ -1,7 +1,7 @@
 """Clutter that is uniform in a figure around the sensor, which moves and turns with it.
 
 The figure is a disc or a square, or the part of it within an angle of the heading. The intensity per square metre is
-rate / area inside and 0 outside; at (bearing, range) it includes the Jacobian, rate * range / area (paper-notes 5).
+rate / area inside and 0 outside. At (bearing, range) it includes the Jacobian, rate * range / area (paper-notes 5).
 """
 
 from __future__ import annotations
@@ -33,14 +33,14 @@ from vedette.models.measurement import MeasurementModel
 
 @kernel
 def _square_up_to(angle: float) -> float:
-    """Area of a square of half side 1 between the direction -pi / 4 and `angle`; grows by 1 each quarter turn."""
+    """Area of a square of half side 1 between the direction -pi / 4 and `angle`. Grows by 1 each quarter turn."""
     quarters = math.floor((angle + 0.25 * math.pi) / (0.5 * math.pi))
     return quarters + 0.5 * (math.tan(angle - 0.5 * math.pi * quarters) + 1.0)
 
 
 @kernel
 def _area(heading: float, size: float, is_square: bool, half_width: float) -> float:
-    """Return the area of the figure in m^2; for a sector of a square it depends on the heading."""
+    """Return the area of the figure in m^2. For a sector of a square it depends on the heading."""
     if is_square:
         return size * size * (_square_up_to(heading + half_width) - _square_up_to(heading - half_width))
     return half_width * size * size
@@ -137,10 +137,10 @@ def around_sensor(
         rate: expected number per scan in the figure.
         kind: kind of the sensor's measurements: "position", "bearing_range" or "bearing_range_rate".
         radius: radius of a disc [m].
-        half_side: half the side of a square along the axes; give either this or the radius [m].
+        half_side: half the side of a square along the axes. Give either this or the radius [m].
         half_width_rad: greatest angle from the heading, either side [rad].
         max_range_rate: largest range rate of a false measurement, either way, where range rates are measured, uniform
-            up to it; none: 300 [m/s].
+            up to it. none: 300 [m/s].
     """
     one_of("kind", kind, _KINDS)
     if (radius is None) == (half_side is None):

@@ -13,7 +13,7 @@ _KINDS = {"motion": MotionModel, "survival": SurvivalModel, "birth": BirthModel}
 
 @dataclass(frozen=True, slots=True)
 class TargetModel:
-    """Model of the targets; one object is shared by all filters that track them.
+    """Model of the targets. One object is shared by all filters that track them.
 
     Two target models are equal if their parts are the same objects.
 
@@ -22,7 +22,7 @@ class TargetModel:
         survival: survival model.
         birth: birth model.
         state_dim: length of a target's state.
-        num_classes: number of classes of targets, as in the birth model; 0 if they have none.
+        num_classes: number of classes of targets, as in the birth model, or 0 if they have none.
 
     Raises:
         InputError: a part of another kind, or models of different state dimensions.

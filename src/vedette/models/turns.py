@@ -37,13 +37,13 @@ class Turn:
 
 
 def with_beam(pose: ArrayLike, velocity: ArrayLike, bearing: float, rate: float) -> Floats:
-    """Return the pose of a scan that is one turn of the beam; see `vedette.kernels.gaussian.beam`.
+    """Return the pose of a scan that is one turn of the beam. See `vedette.kernels.gaussian.beam`.
 
     Args:
         pose: (3 or more,) pose of the sensor at the time of the scan, the middle of the turn.
         velocity: (2,) velocity of the sensor, m/s.
         bearing: bearing of the beam at that time, rad from east.
-        rate: turn rate, rad/s, counter-clockwise positive; 0: the sensor does not turn.
+        rate: turn rate, rad/s, counter-clockwise positive. 0: the sensor does not turn.
 
     Raises:
         InputError: an array has another shape or a number that is not finite.
@@ -62,7 +62,7 @@ def is_turn(poses: Floats) -> bool:
 
 
 def lags(bearings: Floats, pose: Floats) -> Floats:
-    """Return when the beam points in each direction, shape (num,), s after the scan time; 0 without a turn."""
+    """Return when the beam points in each direction, shape (num,), s after the scan time, or 0 without a turn."""
     if not is_turn(pose):
         return np.zeros(len(bearings))
     off = np.remainder(bearings - pose[BEAM] + math.pi, 2.0 * math.pi) - math.pi
@@ -70,7 +70,7 @@ def lags(bearings: Floats, pose: Floats) -> Floats:
 
 
 def longest_lag(pose: Floats) -> float:
-    """Return half the time of a turn, s; 0 without a turn."""
+    """Return half the time of a turn, s, or 0 without a turn."""
     return math.pi / abs(float(pose[BEAM + 1])) if is_turn(pose) else 0.0
 
 

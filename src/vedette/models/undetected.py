@@ -30,18 +30,18 @@ class UndetectedModel:
 
     Attributes:
         grid: the cells.
-        expected: mean number of undetected targets in the region just before the first scan, spread evenly; or
+        expected: mean number of undetected targets in the region just before the first scan, spread evenly, or
             (num_cells,) mean number in each cell.
-        birth_rate: mean number of targets that appear in the region per second; learnt: estimated from the first
+        birth_rate: mean number of targets that appear in the region per second. learnt: estimated from the first
             detections, in beliefs that have an intensity of undetected targets [1/s].
         birth_density: where targets appear: uniformly in the region, or in the cells along its boundary.
         speed: standard deviation of each of the two components of the velocity [m/s].
-        survival: probability of surviving one second; none: that of the survival model over a scan, for a target at
+        survival: probability of surviving one second. none: that of the survival model over a scan, for a target at
             rest at the centre of a cell.
         prior_rate: mean of the prior density of a learnt birth rate, a gamma density of shape 1/2 [1/s].
 
     Raises:
-        InputError: an invalid field; the message has its name, the expected and the given value.
+        InputError: an invalid field. The message has its name, the expected and the given value.
     """
 
     grid: CellGrid
@@ -84,7 +84,7 @@ class UndetectedModel:
 
     @property
     def entering(self) -> Floats:
-        """Weight of each cell for targets that appear, (num_cells,); births are in proportion to it."""
+        """Weight of each cell for targets that appear, (num_cells,). Births are in proportion to it."""
         return np.ones(self.grid.num_cells) if self.birth_density == "uniform" else self.grid.border
 
     @property
@@ -93,7 +93,7 @@ class UndetectedModel:
         return self.prior_rate if isinstance(self.birth_rate, str) else self.birth_rate
 
     def births(self, dt: float, rate: float | None = None) -> Floats:
-        """Mean number of births in each cell in `dt` seconds, (num_cells,). rate: 1/s; None: `first_rate`."""
+        """Mean number of births in each cell in `dt` seconds, (num_cells,). rate: 1/s. None: `first_rate`."""
         number, shares = (self.first_rate if rate is None else rate) * non_negative("dt", dt), self.entering
         return np.asarray(number * shares / shares.sum())
 
@@ -107,7 +107,7 @@ class UndetectedModel:
             expected: (num_cells,) mean number in each cell.
             dt: time step in s, at least 0.
             survival: probability of surviving `dt`: one number, or (num_cells,).
-            rate: birth rate, 1/s; None: `first_rate`.
+            rate: birth rate, 1/s. None: `first_rate`.
         """
         living = (expected * survival).reshape(self.grid.rows, self.grid.columns)
         return moved_in_cells(living, *self.shares(dt)).ravel() + self.births(dt, rate)
@@ -142,7 +142,7 @@ def cell_shares(step: float, size: float, num: int) -> Floats:
 
 
 def _integral_below(x: NDArray[np.floating]) -> Floats:
-    """Return G(-x) = phi(x) - x Phi(-x) for x >= 0; its two terms are nearly equal for large x."""
+    """Return G(-x) = phi(x) - x Phi(-x) for x >= 0. Its two terms are nearly equal for large x."""
     from scipy.special import erfcx
 
     density = np.exp(-0.5 * x * x) / math.sqrt(2.0 * math.pi)

@@ -24,7 +24,7 @@ SWITCH = "on"  # the column of actions for the switch of the sensor: 1: on, 0: o
 
 
 def switch_words(column: str, value: float) -> str:
-    """Return `on` or `off` for the column `on`, or `off at decision 2` for `on_2`; empty for other columns."""
+    """Return `on` or `off` for the column `on`, or `off at decision 2` for `on_2`, and empty for other columns."""
     name, _, decision = column.partition("_")
     if name != SWITCH or (column != name and not decision.isdigit()):
         return ""
@@ -39,7 +39,7 @@ class Options(NamedTuple):
         actions.
     which: (num_actions,) the course of each action.
     pose: (pose_dim,) present pose.
-    prices: (num_courses,) in units of the reward; all actions of a course have the same price.
+    prices: (num_courses,) in units of the reward. All actions of a course have the same price.
     scans: (num_courses, num_times) whether the actions of each course let the sensor scan.
     """
 
@@ -114,7 +114,7 @@ class Actions(SummaryRepr):
 
     Attributes:
         columns: names of the numbers of an action: `heading_deg`, an absolute heading counter-clockwise from +x, or the
-            names that the platform gives; units other than SI units are part of the name.
+            names that the platform gives. Units other than SI units are part of the name.
         values: (num_actions, num_columns), in the order of tables.
 
     Raises:
@@ -162,13 +162,13 @@ class Actions(SummaryRepr):
 class Platform(Protocol):
     """Platform of a sensor: its possible actions, and the poses that follow.
 
-    A pose is [px, py, heading_rad, ...]. All sensors of a run have poses of the same length, the largest of any;
-    components that a platform does not use are 0. A platform receives them too, and need not return them.
+    A pose is [px, py, heading_rad, ...]. All sensors of a run have poses of the same length, the largest of any.
+    Components that a platform does not use are 0. A platform receives them too, and need not return them.
     """
 
     @property
     def columns(self) -> tuple[str, ...]:
-        """Names of an action's numbers, such as `("heading_deg",)`; see `Actions`."""
+        """Names of an action's numbers, such as `("heading_deg",)`. See `Actions`."""
         ...
 
     def actions(self, pose: Floats) -> Floats:
@@ -194,7 +194,7 @@ class SupportsManyActions(Protocol):
 
 @runtime_checkable
 class HasPrices(Protocol):
-    """A platform whose actions have prices, which planners subtract from rewards; actions of others cost nothing."""
+    """A platform whose actions have prices, which planners subtract from rewards. Actions of others cost nothing."""
 
     def prices(self, actions: Floats) -> Floats:
         """Return prices (num_actions,) in units of the reward, of actions (num_actions, num_columns)."""
@@ -203,7 +203,7 @@ class HasPrices(Protocol):
 
 @runtime_checkable
 class HasScans(Protocol):
-    """A platform whose actions may keep its sensor from scanning; sensors of other platforms always scan."""
+    """A platform whose actions may keep its sensor from scanning. Sensors of other platforms always scan."""
 
     def scans(self, pose: Floats, actions: Floats, times: Floats) -> Bools:
         """Return (num_actions, num_times) whether the sensor scans at `times`, s after each action began at `pose`."""
@@ -217,7 +217,7 @@ def check_platform(field: str, platform: Any) -> None:
 
 
 def actions_at(field: str, platform: Platform, pose: Floats) -> Actions:
-    """Return the actions of a platform at a pose; `InputError`, with the name of the platform, for invalid actions."""
+    """Return the actions of a platform at a pose. Raises `InputError`, with the platform's name, for invalid ones."""
     columns = tuple(platform.columns)
     values = float_array(f"{field}.actions", platform.actions(pose.copy()), (None, len(columns)))
     if len(values) == 0:
@@ -229,7 +229,7 @@ def actions_at(field: str, platform: Platform, pose: Floats) -> Actions:
 
 
 def course_of(field: str, platform: Platform, pose: Floats, action: Floats, times: Floats) -> Floats:
-    """Return (num_times, pose_dim) poses after an action; `InputError`, with the platform's name, for invalid poses."""
+    """Return (num_times, pose_dim) poses of an action. Raises `InputError`, naming the platform, for invalid ones."""
     course = platform.course(pose.copy(), action.copy(), times.copy())
     return _checked(f"{field}.course", course, (len(times),), pose)
 
@@ -237,7 +237,7 @@ def course_of(field: str, platform: Platform, pose: Floats, action: Floats, time
 def courses_of(
     field: str, platform: Any, pose: Floats, actions: Floats, times: Floats, abilities: Abilities | None = None
 ) -> Floats:
-    """Return (num_actions, num_times, pose_dim) poses after each action; `InputError` as `course_of`."""
+    """Return (num_actions, num_times, pose_dim) poses after each action. Raises `InputError` as `course_of`."""
     if not len(times):  # at the last scan, and no case for platforms to consider
         return np.empty((len(actions), 0, len(pose)))
     if (abilities or Abilities.of(platform)).takes_many_actions:
@@ -247,14 +247,14 @@ def courses_of(
 
 
 def prices_of(field: str, platform: Platform, actions: Floats) -> Floats:
-    """Return prices (num_actions,) of actions, in units of the reward; `InputError` for invalid prices."""
+    """Return prices (num_actions,) of actions, in units of the reward. Raises `InputError` for invalid prices."""
     if not provides(platform, HasPrices):
         return np.zeros(len(actions))
     return float_array(f"{field}.prices", platform.prices(actions.copy()), (len(actions),))
 
 
 def scans_of(field: str, platform: Platform, pose: Floats, actions: Floats, times: Floats) -> Bools:
-    """Return (num_actions, num_times) whether each action lets its sensor scan; `InputError` for an invalid table."""
+    """Return (num_actions, num_times) whether each action lets the sensor scan. Raises `InputError` if invalid."""
     shape = len(actions), len(times)
     if not provides(platform, HasScans):
         return np.ones(shape, np.bool_)

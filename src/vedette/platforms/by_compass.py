@@ -24,8 +24,8 @@ _DIGITS = 9  # decimals of degrees and metres, so that a course of 60 degrees is
 class ByCompass:
     """A platform whose directions are clockwise from true north instead of counter-clockwise from east.
 
-    `heading_deg` becomes `course_deg`, from 0 to 360, with `speed_mps`; `pointing_deg` becomes `azimuth_deg`. A step is
-    `course_deg`, `speed_mps` and `distance_m`; a waypoint has the course and the speed towards it. The fixed directions
+    `heading_deg` becomes `course_deg`, from 0 to 360, with `speed_mps`. `pointing_deg` becomes `azimuth_deg`. A step is
+    `course_deg`, `speed_mps` and `distance_m`. A waypoint has the course and the speed towards it. The fixed directions
     of `HeadingPlatform`, `GridPlatform` and `Pointing` are relative to true north at any position. Angles given by the
     pose or by a custom platform are angles in the plane, converted at the position of the platform.
 
@@ -141,7 +141,7 @@ def _given(part: Platform, rows: Floats, pose: Floats, compass: Compass) -> Floa
 
 
 def _under_way(part: Platform, rows: Floats, pose: Floats, compass: Compass) -> Floats:
-    """Return (num_rows, 2) course, deg, and speed, m/s, just after each action began; 0 and 0 if it stays."""
+    """Return (num_rows, 2) course, deg, and speed, m/s, just after each action began, or 0 and 0 if it stays."""
     poses = courses_of("platform", part, pose, rows, np.array([_AT_ONCE]))[:, 0]
     away = np.hypot(*(poses[:, :2] - pose[:2]).T) / _AT_ONCE
     speeds = np.round(away, 6)  # at coordinates of a million m there are no more digits

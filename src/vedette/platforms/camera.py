@@ -1,4 +1,4 @@
-"""Cameras that turn and zoom, fixed or mounted; pose [px, py, heading_rad, pointing_rad, half_width_rad]."""
+"""Cameras that turn and zoom, fixed or mounted, with pose [px, py, heading_rad, pointing_rad, half_width_rad]."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ def line_of_sight(pose: Floats) -> float:
 
 
 def view_gap(poses: Floats, places: Floats, radius: float) -> Floats:
-    """Return the distance in m by which a place is out of a sensor's view; 0: in view.
+    """Return the distance in m by which a place is out of a sensor's view. 0: in view.
 
     It is the distance beyond `radius`, m, plus, for a camera, the arc from the place to its field of view. poses: (...,
     pose_dim). places: (..., 2) m. Both are broadcast.
@@ -55,9 +55,9 @@ class Pointing:
 
     Attributes:
         pointings_deg: possible pointings, counter-clockwise from east [deg].
-        relative: whether these are changes of its pointing, added to it; actions are absolute in either case.
-        half_widths_deg: half widths that it may zoom to instantly; none: it does not zoom [deg].
-        turn_rate_deg: turn rate, the shorter way, counter-clockwise if both are as long; none: it turns instantly
+        relative: whether these are changes of its pointing, added to it. Actions are absolute in either case.
+        half_widths_deg: half widths that it may zoom to instantly. none: it does not zoom [deg].
+        turn_rate_deg: turn rate, the shorter way, counter-clockwise if both are as long. none: it turns instantly
             [deg/s].
         blind_while_turning: whether it makes no scan until its turn is complete.
 
@@ -87,7 +87,7 @@ class Pointing:
         return ("pointing_deg", "half_width_deg") if self.half_widths_deg else ("pointing_deg",)
 
     def actions(self, pose: Floats) -> Floats:
-        """Return (num_actions, num_columns) absolute pointings, each at every width; 180 and -180 remain distinct."""
+        """Return (num_actions, num_columns) absolute pointings, each at every width. 180 and -180 remain distinct."""
         _check(pose)
         degrees = np.array(self.pointings_deg)
         if self.relative:
@@ -112,7 +112,7 @@ class Pointing:
         return poses
 
     def scans(self, pose: Floats, actions: Floats, times: Floats) -> Bools:
-        """Return (num_actions, num_times) False while it turns and is blind; True if it turns instantly."""
+        """Return (num_actions, num_times) False while it turns and is blind, True if it turns instantly."""
         if not self.blind_while_turning or self.turn_rate_deg is None:
             return np.ones((len(actions), len(times)), np.bool_)
         turns = np.abs(wrap_angles(np.radians(actions[:, :1]) - pose[POINTING]))
@@ -128,7 +128,7 @@ def _check(pose: Floats) -> None:
 
 @dataclass(frozen=True, slots=True)
 class MountedPlatform:
-    """A pointing sensor mounted on a moving platform; the actions are all combinations of both, columns side by side.
+    """A pointing sensor mounted on a moving platform. The actions are all combinations of both, columns side by side.
 
     Attributes:
         platform: controls position and heading, and receives a pose of these three.

@@ -16,13 +16,13 @@ PAPER_HEADINGS_DEG = tuple(float(angle) for angle in range(-180, 181, 30))
 
 @dataclass(frozen=True, slots=True)
 class HeadingPlatform:
-    """A platform with a list of headings, or of changes of heading, kept until the next decision; there is no boundary.
+    """A platform with a list of headings, or of changes of heading, kept until the next decision. There is no boundary.
 
     Attributes:
-        speed: m/s; or several speeds, of which an action chooses one.
+        speed: m/s, or several speeds, of which an action chooses one.
         headings_deg: degrees, counter-clockwise from +x (the paper's 13 by default, of which -180 and 180 are the
             same).
-        relative: whether they are changes of heading, added to it (paper-notes 14); actions are absolute in either
+        relative: whether they are changes of heading, added to it (paper-notes 14). Actions are absolute in either
             case.
 
     Raises:
@@ -50,7 +50,7 @@ class HeadingPlatform:
         return ("heading_deg",) if isinstance(self.speed, float) else ("heading_deg", "speed")
 
     def actions(self, pose: Floats) -> Floats:
-        """Return (num_actions, num_columns) absolute headings, each at every speed; 180 and -180 remain distinct."""
+        """Return (num_actions, num_columns) absolute headings, each at every speed. 180 and -180 remain distinct."""
         degrees = np.array(self.headings_deg)
         if self.relative:
             degrees = np.degrees(wrap_angles(pose[2] + np.radians(degrees)))
@@ -59,7 +59,7 @@ class HeadingPlatform:
         return np.column_stack([np.repeat(degrees, len(self.speed)), np.tile(self.speed, len(degrees))])
 
     def course(self, pose: Floats, action: Floats, times: Floats) -> Floats:
-        """Return poses on a straight line; headings of -180 and 180 lead to the same poses, bit for bit."""
+        """Return poses on a straight line. Headings of -180 and 180 lead to the same poses, bit for bit."""
         return np.asarray(self.courses(pose, action[np.newaxis], times)[0])
 
     def courses(self, pose: Floats, actions: Floats, times: Floats) -> Floats:

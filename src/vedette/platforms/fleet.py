@@ -20,7 +20,7 @@ class Fleet:
     Attributes:
         platforms: one per sensor.
         starts: (num_sensors, pose_dim) pose of each when it began its action.
-        actions: the row of its action, one per sensor; None: it does not move.
+        actions: the row of its action, one per sensor. None: it does not move.
         since: s, time when they began.
 
     Raises:

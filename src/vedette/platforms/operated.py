@@ -34,10 +34,10 @@ class Operated(PlatformWrapper):
 
     Attributes:
         platform: the platform that moves the sensor.
-        price: of every action; or the name of the column of its actions with the price of each; None: that of the
+        price: of every action, or the name of the column of its actions with the price of each. None: that of the
             platform.
         switchable: whether each action is listed a second time, with the sensor off, after all those with it on.
-        budget: largest number of seconds of scanning in store; component 5 of the pose is the remaining number. The
+        budget: largest number of seconds of scanning in store. Component 5 of the pose is the remaining number. The
             sensor scans until none is left, and then no more before its next action. None: without limit.
         refill: seconds of scanning that the store gains each second, up to `budget`. A sensor that always scans with a
             refill of 0.1 is on for a tenth of the time.
@@ -71,7 +71,7 @@ class Operated(PlatformWrapper):
         return (*self.platform.columns, SWITCH) if self.switchable else tuple(self.platform.columns)
 
     def actions(self, pose: Floats) -> Floats:
-        """Return (num_actions, num_columns) the actions of the platform; then the same with the sensor off."""
+        """Return (num_actions, num_columns) the actions of the platform, then the same with the sensor off."""
         return self.switched_on_and_off(actions_at("platform", self.platform, pose).values)
 
     def switched_on_and_off(self, rows: Floats) -> Floats:
@@ -88,7 +88,7 @@ class Operated(PlatformWrapper):
         return courses
 
     def prices(self, actions: Floats) -> Floats:
-        """Return prices (num_actions,); 0 with the sensor off."""
+        """Return prices (num_actions,), 0 with the sensor off."""
         if self.price is None:
             prices = prices_of("platform", self.platform, self._own(actions))
         elif isinstance(self.price, str):

@@ -59,7 +59,7 @@ class Patrolling(PlatformWrapper):
 
 
 def _last_inside(ways: Floats, at: Floats, place: Floats, radius: float) -> Floats:
-    """Return (num, num_legs) the last time of each straight leg within a radius of a place; -1: never.
+    """Return (num, num_legs) the last time of each straight leg within a radius of a place. -1: never.
 
     ways: (num, num_legs + 1, 2) m, at: (num_legs + 1,) s.
     """

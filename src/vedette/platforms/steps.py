@@ -41,7 +41,7 @@ class GridPlatform:
         allow_staying: whether staying is an action, too, the last one.
 
     Raises:
-        InputError: no direction, or one that is not finite; a length or speed that is not above 0.
+        InputError: no direction, or one that is not finite, or a length or speed that is not above 0.
     """
 
     length: Positive
@@ -69,7 +69,7 @@ class GridPlatform:
         return np.concatenate([steps, np.zeros((1, 2))]) if self.allow_staying else steps
 
     def course(self, pose: Floats, action: Floats, times: Floats) -> Floats:
-        """Return poses during the step, then at its end; the heading is that of the step, and is kept if it stays."""
+        """Return poses during the step, then at its end. The heading is that of the step, and is kept if it stays."""
         return np.asarray(self.courses(pose, action[np.newaxis], times)[0])
 
     def courses(self, pose: Floats, actions: Floats, times: Floats) -> Floats:
@@ -92,10 +92,10 @@ class Waypoints:
     Attributes:
         points: (num_points, 2) m.
         speed: m/s.
-        closed: whether the first follows the last, round and round; otherwise it waits there.
+        closed: whether the first follows the last, round and round. Otherwise it waits there.
 
     Raises:
-        InputError: no point, or one that is not finite; a speed below 0.
+        InputError: no point, or one that is not finite, or a speed below 0.
     """
 
     points: Sequence[Sequence[float]] | Floats
@@ -119,7 +119,7 @@ class Waypoints:
         return np.arange(1.0, len(self.points) + 1)[:, np.newaxis]
 
     def course(self, pose: Floats, action: Floats, times: Floats) -> Floats:
-        """Return poses straight to the waypoint, then from one to the next; the heading is that of the leg."""
+        """Return poses straight to the waypoint, then from one to the next. The heading is that of the leg."""
         first = int(action[0]) - 1
         points = np.asarray(self.points)
         ahead = np.concatenate([points[first:], points[: first + 1]]) if self.closed else points[first:]

@@ -15,7 +15,7 @@ _STEP = 1e-3  # s, time step of the differences that give velocities
 
 @dataclass(frozen=True, slots=True)
 class WithVelocity(PlatformWrapper):
-    """A platform whose poses have its velocity, m/s, as components 6 and 7; poses need 8 components.
+    """A platform whose poses have its velocity, m/s, as components 6 and 7. Poses need 8 components.
 
     The velocity at a time is the mean over the millisecond before it.
 

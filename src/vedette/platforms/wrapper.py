@@ -12,7 +12,7 @@ from vedette.platforms.base import Platform, check_platform, courses_of, prices_
 
 @dataclass(frozen=True, slots=True)
 class PlatformWrapper:
-    """A platform with the actions, prices and scans of another one; subclasses extend its `courses`."""
+    """A platform with the actions, prices and scans of another one. Subclasses extend its `courses`."""
 
     platform: Platform
 
@@ -29,7 +29,7 @@ class PlatformWrapper:
         return np.asarray(self.platform.actions(pose))
 
     def course(self, pose: Floats, action: Floats, times: Floats) -> Floats:
-        """Return the course of one action; see `courses`."""
+        """Return the course of one action, see `courses`."""
         return np.asarray(self.courses(pose, action[np.newaxis], times)[0])
 
     def courses(self, pose: Floats, actions: Floats, times: Floats) -> Floats:

@@ -20,10 +20,10 @@ _NO_SPEED, _NO_COURSE = 102.3, 360.0  # values in AIS for unknown speed and cour
 
 
 def read_ais(file: Path) -> tuple[dict[str, list[Any]], list[int], tuple[str, ...]]:
-    """Return positions of ships: `time`, `id` (MMSI), `longitude`, `latitude`; `vx`, `vy` if every ship reports them.
+    """Return positions of ships: `time`, `id` (MMSI), `longitude`, `latitude`. `vx`, `vy` if every ship reports them.
 
     Times are those of the receiver: in tag blocks (`\\c:1452603741*..\\`), before the message (`2016-01-12T13:02:21Z
-    !AIVDM,...`, or seconds since 1970), or after it (`...*5C,r003669930,1452603741`); for a message of several
+    !AIVDM,...`, or seconds since 1970), or after it (`...*5C,r003669930,1452603741`). For a message of several
     sentences the first time found. Messages without positions are skipped. Damaged lines (by their checksums),
     sentences of incomplete messages, and positions without a time are left out. Returns the columns, the line of each
     row, and a warning that counts the rows left out.
@@ -75,7 +75,7 @@ def _sentence(line: bytes) -> tuple[bytes, float | None]:
 
 
 def _clock(cell: bytes) -> float | None:
-    """Return seconds since 1970 from an ISO 8601 time (default zone UTC) or a number; None for anything else."""
+    """Return seconds since 1970 from an ISO 8601 time (default zone UTC) or a number, or None for anything else."""
     text = cell.decode("ascii", "replace")
     try:
         if text.replace(".", "", 1).isdigit():
@@ -104,7 +104,7 @@ class _Open(NamedTuple):
     lost: list[int]
 
     def joined(self, part: _Part) -> list[_Part]:
-        """Return all parts of the message that this part completes, in order; empty if other parts are missing."""
+        """Return all parts of the message that this part completes, in order, empty if other parts are missing."""
         own = part.sentence
         if own.frag_cnt == 1:
             return [part]
@@ -128,7 +128,7 @@ class _Open(NamedTuple):
 
 
 def _part(line: bytes, number: int) -> _Part | None:
-    """Return the AIS sentence of a line; None for an empty line or another sentence. Raises `ValueError` if damaged."""
+    """Return the AIS sentence of a line, or None for an empty or another line. Raises `ValueError` if damaged."""
     from pyais.exceptions import AISBaseException
     from pyais.messages import AISSentence, NMEASentenceFactory
 
@@ -150,7 +150,7 @@ def _part(line: bytes, number: int) -> _Part | None:
 
 
 def _position(parts: list[_Part]) -> tuple[Any, ...] | None:
-    """Return time, MMSI, longitude, latitude and velocity of a message; None for one without position, or no parts.
+    """Return time, MMSI, longitude, latitude and velocity of a message, or None for one without position, or no parts.
 
     Raises `ValueError` with a description of a message that cannot be decoded, or is a position without a time.
     """
@@ -173,7 +173,7 @@ def _position(parts: list[_Part]) -> tuple[Any, ...] | None:
 
 
 def _velocity(message: dict[str, Any]) -> tuple[float, float] | None:
-    """Return the velocity to the east and north, m/s; None if unknown."""
+    """Return the velocity to the east and north, m/s, or None if unknown."""
     speed, course = message.get("speed"), message.get("course")
     if speed is None or course is None or speed >= _NO_SPEED or course >= _NO_COURSE:
         return None

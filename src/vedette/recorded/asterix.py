@@ -35,7 +35,7 @@ class AsterixTable(NamedTuple):
 
 
 def read_asterix(file: Path, *, reports: bool = False) -> AsterixTable:
-    """Read plots of rotating radars, category 048, or tracks of a system, category 062; a sensor is "SAC/SIC".
+    """Read plots of rotating radars, category 048, or tracks of a system, category 062. A sensor is "SAC/SIC".
 
     Columns of plots are `time`, `sensor`, `bearing_deg` from the north, `range_nmi` and `slant_range_nmi`; if any plot
     has a valid flight level (I048/090), which is taken as the height above the radar, `altitude_m`; if any has a valid
@@ -141,7 +141,7 @@ def _plot(record: Any) -> dict[str, Any] | None:
 
 
 def _range_rate(doppler: Any) -> float | None:
-    """Return a calculated Doppler speed in m/s; None if it is missing or doubtful."""
+    """Return a calculated Doppler speed in m/s, or None if it is missing or doubtful."""
     calculated = None if doppler is None else doppler.variation.get_item("CAL")
     if calculated is None or calculated.variation.get_item("D").as_uint():
         return None
@@ -149,14 +149,14 @@ def _range_rate(doppler: Any) -> float | None:
 
 
 def _height(level: Any) -> float | None:
-    """Return the height of a flight level in m; None if it is missing, not validated or garbled."""
+    """Return the height of a flight level in m, or None if it is missing, not validated or garbled."""
     if level is None or any(level.variation.get_item(name).as_uint() for name in ("V", "G")):
         return None
     return _FLIGHT_LEVEL * _quantity(level, "FL", "FL")
 
 
 def _ground_range(slant: float, height: float | None) -> float | None:
-    """Return the range along the radar's horizontal plane, m, for a round Earth; None if the height is unknown."""
+    """Return the range along the radar's horizontal plane, m, for a round Earth, or None if the height is unknown."""
     if height is None:
         return None
     up = ((_EARTH + height) ** 2 - _EARTH**2 - slant**2) / (2.0 * _EARTH)

@@ -19,8 +19,8 @@ def read_bag(file: Path, *, reports: bool) -> tuple[dict[str, list[Any]], list[i
     """Return the messages of a bag, each at the time of its header.
 
     Positions of `PoseArray` and `PointStamped`, in metres in the plane of the scenario: `time`, `sensor` (the topic),
-    `x`, `y`; an array without poses is a scan without measurements. With `reports`, positions of the senders of
-    `NavSatFix`: `time`, `id` (the topic), `longitude`, `latitude`; messages without a fix are skipped, and so are all
+    `x`, `y`. An array without poses is a scan without measurements. With `reports`, positions of the senders of
+    `NavSatFix`: `time`, `id` (the topic), `longitude`, `latitude`. Messages without a fix are skipped, and so are all
     other messages. Returns the columns and the number of each row's message among the messages read.
 
     Raises:

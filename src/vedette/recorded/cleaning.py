@@ -20,11 +20,11 @@ class RecordedTrack:
     """One uninterrupted track of a recorded target.
 
     Attributes:
-        name: the record's own name of the target; several tracks may share it.
+        name: the record's own name of the target. Several tracks may share it.
         times: (n,) s, increasing, at least two.
         positions: (n, 2) m.
         velocities: (n, 2) m/s, as recorded or from finite differences.
-        altitudes: (n,) m; None if they are not recorded.
+        altitudes: (n,) m, or None if they are not recorded.
     """
 
     name: str
@@ -36,7 +36,7 @@ class RecordedTrack:
 
 @dataclass(frozen=True, slots=True)
 class CleaningCounts:
-    """Numbers of reports: all, jumps, outside the region; numbers of tracks: too short, too slow, and retained."""
+    """Numbers of reports: all, jumps, outside the region. Numbers of tracks: too short, too slow, and retained."""
 
     reports: int
     jumps: int
@@ -62,9 +62,9 @@ class Cleaning:
     """Settings of the steps from reports to tracks, in this order.
 
     Attributes:
-        max_speed: as few reports as possible are dropped so that no two successive ones need a higher speed (jumps);
+        max_speed: as few reports as possible are dropped so that no two successive ones need a higher speed (jumps).
             none: no limit [m/s].
-        region: reports outside it are removed, and a track ends where it leaves; None: everywhere.
+        region: reports outside it are removed, and a track ends where it leaves. None: everywhere.
         max_gap: a longer silence ends a track, and the next report begins another [s].
         min_speed: a track slower than this on average (path length over duration) is left out, such as a moored ship
             [m/s].
@@ -122,7 +122,7 @@ class Cleaning:
 def longest_reachable(times: Floats, positions: Floats, max_speed: float) -> Ints:
     """Return indices of the most reports of one target that are possible at `max_speed`, in order of time.
 
-    Reachability is transitive, so the longest chain over pairs in order is exact; a bad first report cannot remove the
+    Reachability is transitive, so the longest chain over pairs in order is exact. A bad first report cannot remove the
     good ones.
     """
     num_reports = len(times)

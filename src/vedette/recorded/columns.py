@@ -21,7 +21,7 @@ from vedette.recorded.turns import RadarService
 
 
 class ScanColumns:
-    """The columns of a table as quantities; raises `InputError` for missing or inconsistent ones."""
+    """The columns of a table as quantities. Raises `InputError` for missing or inconsistent ones."""
 
     def __init__(
         self, table: Table, sites: Sequence[RecordedSensor], conventions: Conventions, origin: Origin | None
@@ -45,7 +45,7 @@ class ScanColumns:
         self.accuracy = tuple(map(self._accuracy, sites))
 
     def service_of(self, sensor: int) -> RadarService | None:
-        """Return the turn of a sensor by its service messages; None without any."""
+        """Return the turn of a sensor by its service messages, or None without any."""
         return next((own for name, own in self.table.service.items() if self._numbers.get(name) == sensor), None)
 
     def _has_gaps(self, quantity: str) -> bool:
@@ -109,7 +109,7 @@ class ScanColumns:
         raise AssertionError  # the line above raises for a missing column
 
     def _found(self, quantity: str, units: Mapping[str, float]) -> tuple[str, float] | None:
-        """Return the column of a quantity and the size of its unit in SI; None if there is none."""
+        """Return the column of a quantity and the size of its unit in SI, or None if there is none."""
         if (named := self.conventions.columns.get(quantity)) is not None:
             self.table.column(named)
             return named, self._unit(quantity, named, units)

@@ -80,13 +80,13 @@ class Conventions:
     Attributes:
         columns: name in the table of a quantity, if it differs: {"time": "Time", "sensor": "radar", ...}.
         units: unit of a quantity ("m", "km", "nmi"; "deg", "rad"; "s", "ms"), if its column's name does not end with
-            it, as `range_km` and `bearing_deg` do. The defaults are m and s; angles have none.
-        bearings: zero and sense of bearings and headings: "north", clockwise, like a compass; or "east",
+            it, as `range_km` and `bearing_deg` do. The defaults are m and s. Angles have none.
+        bearings: zero and sense of bearings and headings: "north", clockwise, like a compass, or "east",
             counter-clockwise, like the library.
-        scan_window: s; rows of a sensor within this time after its first make one scan, at the mean of their times.
-        empty_scans: "found": between the rows of a sensor with a regular period, a scan without rows found nothing;
+        scan_window: s. Rows of a sensor within this time after its first make one scan, at the mean of their times.
+        empty_scans: "found": between the rows of a sensor with a regular period, a scan without rows found nothing.
             "none": the sensor did not scan.
-        bad_rows: "refuse": an unreadable row is an error; "skip": it is left out and counted.
+        bad_rows: "refuse": an unreadable row is an error. "skip": it is left out and counted.
 
     Raises:
         InputError: an unknown quantity, unit or word, or a time below 0.

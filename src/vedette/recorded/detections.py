@@ -27,12 +27,12 @@ def table_of_detections(
     and a `rotation_offset`, they are the sensor's position and rotation.
 
     Args:
-        reader: pairs of a time (a `datetime`; without a zone it is taken as UTC) and a set of detections, each with a
+        reader: pairs of a time (a `datetime`, taken as UTC without a zone) and a set of detections, each with a
             `state_vector`. If `sensor` is given, an empty set is a scan without measurements, at the sensor's last
             position.
         quantities: of the elements of the state vector, such as ("bearing", "range"): bearing, range, range_rate, x,
-            y, lon or lat; None: an element that is ignored.
-        sensor: of all detections; None: each gives its own in `metadata["sensor"]`.
+            y, lon or lat. None: an element that is ignored.
+        sensor: of all detections. None: each gives its own in `metadata["sensor"]`.
 
     Raises:
         InputError: names the scan, the detection and its attribute, and the expected and given values.

@@ -49,7 +49,7 @@ def empty_scans(times: Floats, rows: Floats, scan_of_rows: Ints) -> tuple[Floats
 
 
 def _period(gaps: Floats) -> float | None:
-    """Return the time, s, whose multiples the times between scans with rows are; None without one."""
+    """Return the time, s, whose multiples the times between scans with rows are, or None without one."""
     if len(gaps) < _FEWEST - 1:
         return None
     for start in np.quantile(gaps, _TRIED).tolist():
@@ -65,7 +65,7 @@ def _period(gaps: Floats) -> float | None:
 
 
 def _longest(counts: Ints) -> int:
-    """Return the largest number of empty scans in a gap that is no outage; 0 if there are too many outages.
+    """Return the largest number of empty scans in a gap that is no outage, or 0 if there are too many outages.
 
     Each gap is compared with the share of empty scans in all shorter ones.
     """

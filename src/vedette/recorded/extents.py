@@ -17,7 +17,7 @@ _MOST_WILD = 50  # one row in this number may be wild on a side
 
 
 def places_of(scan: Floats, pose: Floats, kind: str) -> Floats:
-    """Return the (num, 2) places in m of a scan by a sensor at a pose; none if the kind measures no places.
+    """Return the (num, 2) places in m of a scan by a sensor at a pose, or none if the kind measures no places.
 
     Slant ranges without a height count as ranges in the plane.
     """

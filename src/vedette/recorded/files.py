@@ -34,7 +34,7 @@ def read_table(path: str | Path, *, reports: bool = False, sha256: str | None = 
     Args:
         path: of the file.
         reports: True to read positions that targets report, from a file that may have scans, too.
-        sha256: SHA-256 that the file must have, in hexadecimal digits; None: any.
+        sha256: SHA-256 that the file must have, in hexadecimal digits. None: any.
 
     Raises:
         MissingPackageError: the package that reads the format is not installed.
@@ -102,7 +102,7 @@ def _csv(file: Path, content: bytes) -> Table:
 
 
 def header_of(reader: Iterator[list[str]], file: Path) -> list[str]:
-    """Return the names of the columns of a CSV file; raises `InputError` if the separators are not commas."""
+    """Return the names of the columns of a CSV file. Raises `InputError` if the separators are not commas."""
     header = [name.strip() for name in next(reader, [])]
     other = next((letter for letter in _SEPARATORS if letter in header[0]), None) if len(header) == 1 else None
     if other is not None:

@@ -77,7 +77,7 @@ class Origin:
         return np.asarray(ups <= 0.0)
 
     def nearby(self, longitude_deg: float, latitude_deg: float) -> tuple[float, float] | None:
-        """Return the place in the plane, m, of a place in degrees; None if it is beyond `PLANE_REACH`."""
+        """Return the place in the plane, m, of a place in degrees, or None if it is beyond `PLANE_REACH`."""
         try:
             x, y = self.to_plane([longitude_deg], [latitude_deg])[0].tolist()
         except InputError:  # on the other side of the globe

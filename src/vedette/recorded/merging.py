@@ -28,7 +28,7 @@ class Spread(NamedTuple):
 
     @property
     def std(self) -> float:
-        """Standard deviation of a return on each axis, m; 0 without returns."""
+        """Standard deviation of a return on each axis, m, or 0 without returns."""
         return math.sqrt(self.squares / (2 * max(self.num, 1)))
 
     def added_to(self, scan: Floats, kind: str) -> Floats:

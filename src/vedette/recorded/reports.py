@@ -26,7 +26,7 @@ class Reports:
     """Positions of targets, sorted by target and time.
 
     Attributes:
-        times: (n,) s; for ISO 8601 times, seconds since 1970 UTC.
+        times: (n,) s. For ISO 8601 times, seconds since 1970 UTC.
         tracks: (n,) index into `names`.
         positions: (n, 2) m.
         velocities: (n, 2) m/s along x and y of the plane, or None if the record has none.
@@ -61,16 +61,16 @@ def parse_reports(
     origin_deg: tuple[float, float] | None = None,
     usual_origin_deg: tuple[float, float] | None = None,
 ) -> Reports:
-    """Return reports from a table with columns time, id and x, y or longitude, latitude; vx, vy, altitude if given.
+    """Return reports from a table with columns time, id and x, y or longitude, latitude, and vx, vy, altitude if given.
 
     In a geographic record `vx` and `vy` are to true east and north at the place of each report.
 
     Args:
-        table: see `read_table`; state vectors of OpenSky are recognised by their columns if `columns` names none.
+        table: see `read_table`. State vectors of OpenSky are recognised by their columns if `columns` names none.
         columns: names in the table if they differ: {"time": "Time", "id": "MMSI", ...}. Naming a longitude and latitude
-            makes the record geographic; otherwise x, y are used if they are there.
-        origin_deg: longitude and latitude of (0, 0) for a geographic record; an error for any other.
-        usual_origin_deg: used if `origin_deg` is None, and ignored for other records; None: the median of the reports.
+            makes the record geographic. Otherwise x, y are used if they are there.
+        origin_deg: longitude and latitude of (0, 0) for a geographic record, an error for any other.
+        usual_origin_deg: used if `origin_deg` is None, and ignored for other records. None: the median of the reports.
 
     Raises:
         InputError: names the file, row, column, and the expected and given values.
@@ -105,7 +105,7 @@ def parse_reports(
 
 
 def _altitude_column(table: Table, given: Mapping[str, str]) -> tuple[str, float]:
-    """Return the column of altitudes and the size of its unit in m; "" if there is none."""
+    """Return the column of altitudes and the size of its unit in m, or "" if there is none."""
     if name := given.get("altitude"):
         return name, next((size for unit, size in HEIGHTS.items() if name.endswith(f"_{unit}")), 1.0)
     named = ((f"altitude_{unit}", size) for unit, size in HEIGHTS.items())
@@ -113,7 +113,7 @@ def _altitude_column(table: Table, given: Mapping[str, str]) -> tuple[str, float
 
 
 def _altitudes(table: Table, given: Mapping[str, str]) -> Floats | None:
-    """Return the altitudes of all reports, m; None without a column, or if a report that needs none has none."""
+    """Return the altitudes of all reports, m, or None without a column, or if a report that needs none has none."""
     name, unit = _altitude_column(table, given)
     if not name or (not given.get("altitude") and any(map(is_empty, table.column(name)))):
         return None
@@ -121,7 +121,7 @@ def _altitudes(table: Table, given: Mapping[str, str]) -> Floats | None:
 
 
 def usual_names(columns: Iterable[str]) -> dict[str, str]:
-    """Return columns under other usual names; places in degrees only if there are none in metres."""
+    """Return columns under other usual names, places in degrees only if there are none in metres."""
     have = set(columns)
     quantities = ("time", "id") if {"x", "y"} <= have else ("time", "id", "longitude", "latitude")
     columns_of = {}
@@ -170,7 +170,7 @@ def _to_plane(table: Table, given: Mapping[str, str], origin: Origin, degrees: l
 
 
 def _median_longitude(longitudes: Floats) -> float:
-    """Return the median of longitudes, also on both sides of 180 degrees; from -180 to 180."""
+    """Return the median of longitudes, also on both sides of 180 degrees, from -180 to 180."""
     around = longitudes[0] + np.remainder(longitudes - longitudes[0] + 180.0, 360.0) - 180.0
     middle = float(np.median(around))
     return middle if abs(middle) <= 180.0 else middle - math.copysign(360.0, middle)

@@ -36,7 +36,7 @@ _RESOLVED = 2.0  # standard deviations; another sensor tells returns apart that 
 class ReturnsModel(NamedTuple):
     """Assumed parameters of a sensor that extents are learnt from.
 
-    extent: m, if it is given. stds: noise of each component, rad and m; None: unknown. probability: of detection.
+    extent: m, if it is given. stds: noise of each component, rad and m. None: unknown. probability: of detection.
     """
 
     extent: float | None
@@ -63,7 +63,7 @@ class PlacedScan(NamedTuple):
 def extents_of(
     recording: RecordedScans, sites: Sequence[RecordedSensor], models: Sequence[ReturnsModel]
 ) -> list[Extent | None]:
-    """Return the extent of targets for each sensor; None where its measurements are of a target each.
+    """Return the extent of targets for each sensor, or None where its measurements are of a target each.
 
     Returns within a distance of each other are of targets with one return each that are detected independently, or of
     one target. The second holds at the distance with the largest log likelihood ratio, if that is 20 or more. It is
@@ -119,7 +119,7 @@ def _tested(
 
 
 def groups(places: Floats, distance: float) -> Ints:
-    """Return the index of the group of each place, (num,); neighbours in a group are at most a distance apart."""
+    """Return the index of the group of each place, (num,). Neighbours in a group are at most a distance apart."""
     return _cut(linkage(places, "single") if len(places) > 1 else np.empty((0, 4)), distance, len(places))
 
 
@@ -128,7 +128,7 @@ def _cut(joins: Floats, distance: float, num: int) -> Ints:
 
 
 def placed_scans(recording: RecordedScans, s: int, site: RecordedSensor, model: ReturnsModel) -> list[PlacedScan]:
-    """Return the scans of a sensor in order of time; none if it measures no places."""
+    """Return the scans of a sensor in order of time, or none if it measures no places."""
     if site.kind not in PLACED:
         return []
     found = []
@@ -229,7 +229,7 @@ def _by_other(
 
 
 def _log_binomial(seen: Floats, num: Floats, probability: float, least: float) -> Floats:
-    """Return the log probability to see this number of some targets, given that any is seen; at least `least`."""
+    """Return the log probability to see this number of some targets, given that any is seen, at least `least`."""
     p = min(max(probability, 1e-3), 1.0 - 1e-3)
     choose = gammaln(num + 1.0) - gammaln(seen + 1.0) - gammaln(np.maximum(num - seen, 0.0) + 1.0)
     value = choose + seen * math.log(p) + (num - seen) * math.log1p(-p) - np.log(-np.expm1(num * math.log1p(-p)))

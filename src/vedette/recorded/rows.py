@@ -73,7 +73,7 @@ class Rows(ScanColumns):
         return Row(i, time, s, self._measured(i, s, pose, accuracy), pose, tuple(accuracy.values()))
 
     def _site(self, i: int) -> int:
-        """Return the sensor of a row; without a column of sensors, the only one."""
+        """Return the sensor of a row, or without a column of sensors, the only one."""
         if self._sensor is None:
             return 0
         if (label := self._label(i)) not in self._numbers:
@@ -120,7 +120,7 @@ class Rows(ScanColumns):
     def _measured(
         self, i: int, s: int, pose: Sequence[float], accuracy: Mapping[str, float]
     ) -> tuple[float, ...] | None:
-        """Return the measurement as filters take it; None for a scan without measurements."""
+        """Return the measurement as filters take it, or None for a scan without measurements."""
         site = self.sites[s]
         quantities: tuple[str, ...] = COMPONENTS[site.kind]
         if is_position(site.kind) and "lon" in self._columns:
@@ -139,7 +139,7 @@ class Rows(ScanColumns):
         return (*measured, *self._row_noise(i, s, measured, pose, accuracy))
 
     def _third(self, i: int, quantity: str) -> float:
-        """Return a measured value; of a third component that the row does not have, what stands in for it."""
+        """Return a measured value, or of a third component that the row does not have, what stands in for it."""
         return GAPS[quantity] if quantity in GAPS and self._is_blank(i, quantity) else self._value(i, quantity)
 
     def _accuracy_value(self, i: int, s: int, name: str) -> float:
@@ -163,7 +163,7 @@ class Rows(ScanColumns):
     def _row_noise(
         self, i: int, s: int, measured: Sequence[float], pose: Sequence[float], accuracy: Mapping[str, float]
     ) -> tuple[float, ...]:
-        """Return covariance and log likelihood ratios of a row in the order of `row_noise`; () for rows without any."""
+        """Return covariance and log likelihood ratios of a row in the order of `row_noise`, or () without any."""
         if self.accuracy[s] is None:
             return ()
         own, site = {name: value for name, value in accuracy.items() if not math.isnan(value)}, self.sites[s]
@@ -198,7 +198,7 @@ class Rows(ScanColumns):
         return value
 
     def _pose(self, i: int, s: int) -> tuple[float, ...]:
-        """Return the pose of the sensor; the site gives what is not in the row."""
+        """Return the pose of the sensor. The site gives what is not in the row."""
         site = self.sites[s]
         place: tuple[float, ...] = site.pose[:2]
         is_blank = all(self._is_blank(i, name) for name in _OWN_POSE if name in self._columns)
@@ -219,11 +219,11 @@ class Rows(ScanColumns):
         return tuple(pose)
 
     def _has(self, i: int, names: Sequence[str], at_site: bool) -> bool:
-        """Return True if a row has these columns; cells may be empty only where the sensor is at its site."""
+        """Return True if a row has these columns. Cells may be empty only where the sensor is at its site."""
         return {*names} <= set(self._columns) and not (at_site and any(self._is_blank(i, name) for name in names))
 
     def _agreed(self, i: int, place: tuple[float, ...], x: str, y: str) -> tuple[float, ...]:
-        """Return a place given in degrees; raises if the row has one in metres, too, that does not agree."""
+        """Return a place given in degrees. Raises if the row has one in metres, too, that does not agree."""
         if not {x, y} <= set(self._columns) or self._is_blank(i, x) or self._is_blank(i, y):
             return place
         apart = math.hypot(self._value(i, x) - place[0], self._value(i, y) - place[1])

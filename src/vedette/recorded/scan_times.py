@@ -47,16 +47,16 @@ class RecordedSensor:
     """A sensor of a recording.
 
     Attributes:
-        name: in the rows; its number, from 1, is accepted, too.
+        name: in the rows. Its number, from 1, is accepted, too.
         kind: of its measurements, a key of `vedette.internal.quantities.COMPONENTS`.
         pose: [px, py, heading_rad, ...] if the rows have none.
-        bias: of its rows, removed on reading; corrected ranges below 1 m become 1 m.
+        bias: of its rows, removed on reading. Corrected ranges below 1 m become 1 m.
         compass: True if its bearings are degrees clockwise from true north, unless the rows give another convention.
-        reach: m, beyond which it measures nothing; inf: unknown.
-        north: direction of true north; an `Origin` gives it at every place, the default is along y.
-        turn: how its beam turns, if its scans are turns; "found": from its rows, if they show one; "none": no turn.
-        signal: signal-to-noise ratios of its measurements; None: a column of these is not read.
-        features: reported classes and sizes of its measurements; None: columns of these are not read.
+        reach: m, beyond which it measures nothing. inf: unknown.
+        north: direction of true north. An `Origin` gives it at every place, the default is along y.
+        turn: how its beam turns, if its scans are turns. "found": from its rows, if they show one. "none": no turn.
+        signal: signal-to-noise ratios of its measurements. None: a column of these is not read.
+        features: reported classes and sizes of its measurements. None: columns of these are not read.
     """
 
     name: str
@@ -73,7 +73,7 @@ class RecordedSensor:
     def from_raw(self, raw: ArrayLike, pose: ArrayLike | None = None) -> Floats:
         """Return (num, meas_dim) measurements for filters, bias included, from the sensor's own measurements.
 
-        pose: of the sensor then; None: the site's own.
+        pose: of the sensor then. None: the site's own.
 
         Raises:
             InputError: another shape, or numbers that are not finite.
@@ -82,7 +82,7 @@ class RecordedSensor:
         return self._with_angles(values, lambda angles: self.north.angle(np.radians(angles), at), np.radians)
 
     def to_raw(self, measurements: ArrayLike, pose: ArrayLike | None = None) -> Floats:
-        """Return the inverse of `from_raw`; bearings from 0 to 360 degrees."""
+        """Return the inverse of `from_raw`, with bearings from 0 to 360 degrees."""
         values, at = float_array("measurements", measurements, (None, len(COMPONENTS[self.kind]))), self._place(pose)
         return self._with_angles(values, lambda angles: course_deg(self.north, angles, at), np.degrees)
 
@@ -103,23 +103,23 @@ class RecordedScans(SummaryRepr):
 
     Attributes:
         times: (num_instants,) s after the first, increasing.
-        start: s; the recorded time of the first: since 1970 UTC if times were dates.
+        start: s, the recorded time of the first: since 1970 UTC if times were dates.
         is_utc: True if times were dates.
         scans: for each instant one per sensor: (num, meas_dim) measurements as filters take them, with their noise
-            (`vedette.models.with_row_noise`) if the rows have it; None: it did not scan.
+            (`vedette.models.with_row_noise`) if the rows have it. None: it did not scan.
         poses: (num_instants, num_sensors, 3 or more), each sensor at its last scan, or before it at its first one.
         skipped: faults of the rows that were left out.
-        bearings: for each sensor, the convention of bearings in its rows, in which a bearing's bias counts; None: it
+        bearings: for each sensor, the convention of bearings in its rows, in which a bearing's bias counts. None: it
             has none.
         unused: columns that were not read.
-        notes: warnings: slant ranges; for a sensor whose measurements were merged, their number and spread.
+        notes: warnings: slant ranges, and for a sensor whose measurements were merged, their number and spread.
         file: of the rows.
         accuracy: for each instant one per sensor: (num, num_columns) values of columns of accuracy as they were read,
-            SI units, NaN for an empty cell; None: no scan, or no such columns.
-        accuracy_columns: for each sensor, their quantities, such as "range_std" or "snr"; a
+            SI units, NaN for an empty cell. None: no scan, or no such columns.
+        accuracy_columns: for each sensor, their quantities, such as "range_std" or "snr". A
             "class" is the index of its name in the sensor's `features.reports`.
-        gathered: for each sensor, the median time between the first and the last row of its scans of several rows, s; 0
-            for a sensor without such scans or whose scans are turns; () if the scans are not from rows.
+        gathered: for each sensor, the median time between the first and the last row of its scans of several rows, s,
+            or 0 for a sensor without such scans or whose scans are turns, and () if the scans are not from rows.
         empty: descriptions of the scans without a row that were found, one for each sensor with any.
     """
 
@@ -146,14 +146,14 @@ class RecordedScans(SummaryRepr):
         )
 
     def between(self, begin: float, end: float) -> RecordedScans:
-        """Return the instants from `begin` to before `end`, s of `times`; their times start at 0."""
+        """Return the instants from `begin` to before `end`, s of `times`. Their times start at 0."""
         low, high = np.searchsorted(self.times, [begin, end]).tolist()
         first = float(self.times[low]) if low < high else 0.0
         parts = {name: getattr(self, name)[low:high] for name in ("scans", "poses", "accuracy")}
         return replace(self, times=self.times[low:high] - first, start=self.start + first, **parts)
 
     def arrivals(self) -> Iterator[SensorScan]:
-        """Yield every scan separately, in order of time, as `OutOfSequenceTracker` takes them; times as in `times`."""
+        """Yield every scan separately, in order of time (as in `times`), as `OutOfSequenceTracker` takes them."""
         for time, scans, poses in zip(self.times.tolist(), self.scans, self.poses, strict=True):
             for s, scan in enumerate(scans):
                 if scan is not None:

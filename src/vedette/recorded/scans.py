@@ -41,7 +41,7 @@ def parse_scans(
     """Return scans from rows of one measurement each: time, sensor, and the measured quantities.
 
     A row whose measured cells are all empty is a scan without measurements. So is one that lies beyond the sensor's
-    reach or far beyond all others (see `vedette.recorded.extents.wild`); it is listed in `skipped`.
+    reach or far beyond all others (see `vedette.recorded.extents.wild`). It is listed in `skipped`.
 
     Args:
         table: see `vedette.recorded.files.read_table`.
@@ -110,7 +110,7 @@ def _lasting(name: str, times: Floats, off: Floats) -> Iterator[str]:
 def _at_instants(rows: list[Row], how: Rows, skipped: tuple[str, ...], marked: set[int]) -> RecordedScans:
     """Return rows with one sensor and time as scans, scans with one time as instants.
 
-    marked: sensors with rows of empty cells; they have no other empty scans.
+    marked: sensors with rows of empty cells. They have no other empty scans.
     """
     looks, sites, window, texts = list[RecordedScan](), how.sites, how.conventions.scan_window, dict[str, str]()
     spans = [0.0] * len(sites)
@@ -138,7 +138,7 @@ def _at_instants(rows: list[Row], how: Rows, skipped: tuple[str, ...], marked: s
 
 
 def _without_rows(scans: list[RecordedScan], site: RecordedSensor) -> tuple[list[RecordedScan], str]:
-    """Return the scans between those with rows that have none, and a description; nothing without a period."""
+    """Return the scans between those with rows that have none, and a description, or nothing without a period."""
     is_placed, dim = site.kind in PLACED, len(COMPONENTS[site.kind])
     places = [
         places_of(look.scan, look.pose, site.kind) if is_placed else measured_part(look.scan, dim) for look in scans
@@ -159,7 +159,7 @@ def _without_rows(scans: list[RecordedScan], site: RecordedSensor) -> tuple[list
 
 
 def _looks_of_turns(rows: list[Row], sensor: int, how: Rows) -> list[RecordedScan] | None:
-    """Return the scans of a turning radar; None without a turn."""
+    """Return the scans of a turning radar, or None without a turn."""
     own, site = [row for row in rows if row.measured is not None], how.sites[sensor]
     if not own:
         return None

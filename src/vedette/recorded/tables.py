@@ -29,8 +29,8 @@ _MOST_NAMES = 20
 class Table:
     """Unchanged columns, the row number of each entry in its file, and a name for messages.
 
-    bearings: their zero in the format, "north" or "east"; None: not defined. notes: warnings. sha256: of the file, in
-    hexadecimal digits; "" for columns in memory. service: turns of sensors by their service messages.
+    bearings: their zero in the format, "north" or "east". None: not defined. notes: warnings. sha256: of the file, in
+    hexadecimal digits, or "" for columns in memory. service: turns of sensors by their service messages.
     """
 
     columns: Mapping[str, Sequence[Any]]
@@ -42,7 +42,7 @@ class Table:
     service: Mapping[str, RadarService] = field(default_factory=dict)
 
     def column(self, name: str) -> Sequence[Any]:
-        """Return the cells of a column; raises `InputError` with the names of all columns if it is missing."""
+        """Return the cells of a column. Raises `InputError` with the names of all columns if it is missing."""
         if name not in self.columns:
             have = column_names(self.columns) or "none"
             raise InputError(f"{self.source}: expected a column {shown(name)}; got columns {have}")
@@ -93,7 +93,7 @@ class Table:
 
 
 def across_midnight(times: Floats) -> Floats:
-    """Return seconds of the day that pass midnight as times that increase over it; other times unchanged.
+    """Return seconds of the day that pass midnight as times that increase over it, and other times unchanged.
 
     times: (num,) s, in the order of rows, which must be that of time if they span more than half a day.
     """
@@ -106,7 +106,7 @@ def across_midnight(times: Floats) -> Floats:
 
 
 def as_table(frame: Any, source: str = "table") -> Table:
-    """Return a table of columns in memory: a mapping, or a data frame of pandas or Polars; messages count rows from 1.
+    """Return a table of columns in memory: a mapping, or a data frame of pandas or Polars. Messages count rows from 1.
 
     Raises `InputError` for something else, or columns of different lengths.
     """
@@ -127,7 +127,7 @@ def column_names(names: Iterable[str]) -> str:
 
 
 def number(cell: Any) -> float:
-    """Return the number in a cell, or in its text; raises `TypeError` or `ValueError` for anything else."""
+    """Return the number in a cell, or in its text. Raises `TypeError` or `ValueError` for anything else."""
     if isinstance(cell, str):
         if "_" in cell or not cell.isascii():  # Python would read 1_000 and digits of any script
             raise ValueError(cell)
@@ -151,7 +151,7 @@ def is_number(cell: Any) -> bool:
 
 
 def are_dates(cells: Sequence[Any]) -> bool:
-    """Return True if more of the cells are ISO 8601 times than numbers; for equal numbers the first cell decides.
+    """Return True if more of the cells are ISO 8601 times than numbers. For equal numbers the first cell decides.
 
     The majority decides, so that a single bad cell is reported as the bad one.
     """
@@ -171,7 +171,7 @@ def _is_date(cell: Any) -> bool:
 
 
 def seconds(time: Any) -> float:
-    """Return a number, or the seconds from 1970 UTC to an ISO 8601 time or `datetime`; the default zone is UTC."""
+    """Return a number, or the seconds from 1970 UTC to an ISO 8601 time or `datetime`. The default zone is UTC."""
     if is_number(time):
         return number(time)
     moment = time if isinstance(time, datetime) else datetime.fromisoformat(str(time).strip())

@@ -25,21 +25,21 @@ _FIRST_DATE, _LAST_DATE = 1e8, 1e10  # s of the Unix epoch, 1973 and 2286
 
 @dataclass(frozen=True, slots=True, eq=False)
 class RecordedTargets:
-    """Targets that follow recorded reports; between them, a cubic through positions and velocities (Hermite).
+    """Targets that follow recorded reports. Between them, a cubic through positions and velocities (Hermite).
 
     A target exists from its first report to its last. States are [px, py, vx, vy], or [px, py, vx, vy, pz, vz] with
-    `with_height`; ids count the tracks in order of their first report.
+    `with_height`. Ids count the tracks in order of their first report.
 
     Attributes:
         reports: see `from_file` and `from_columns`.
-        time_origin: recorded time of the first scan: seconds, or an ISO 8601 time; None: the earliest report.
+        time_origin: recorded time of the first scan: seconds, or an ISO 8601 time. None: the earliest report.
         cleaning: settings of the steps from reports to tracks.
         with_height: True for states with the recorded altitudes, between which heights change steadily.
         tracks: the tracks, in order of target id.
         counts: of what the cleaning left out.
 
     Raises:
-        InputError: no track is left after the cleaning; heights are wanted, and no altitudes are recorded.
+        InputError: no track is left after the cleaning, or heights are wanted, and no altitudes are recorded.
     """
 
     reports: Reports
@@ -81,8 +81,8 @@ class RecordedTargets:
         Args:
             path: of a file that `read_table` reads, such as .csv or .parquet.
             columns: names in the file if they differ, {"time": "Time", "id": "MMSI", "longitude": "lon", ...}.
-            origin_deg: longitude and latitude of (0, 0), for the tangent plane; only for longitudes and latitudes.
-            usual_origin_deg: used if `origin_deg` is None, and ignored for x and y; None: the median of the reports.
+            origin_deg: longitude and latitude of (0, 0), for the tangent plane, only for longitudes and latitudes.
+            usual_origin_deg: used if `origin_deg` is None, and ignored for x and y. None: the median of the reports.
             time_origin, cleaning: see the class.
             sha256: see `read_table`.
 
@@ -103,7 +103,7 @@ class RecordedTargets:
         time_origin: float | str | None = None,
         cleaning: Cleaning | None = None,
     ) -> RecordedTargets:
-        """Return targets from columns in memory, a mapping or a data frame; see `from_file`.
+        """Return targets from columns in memory, a mapping or a data frame. See `from_file`.
 
         Messages count rows from 1.
         """
@@ -111,7 +111,7 @@ class RecordedTargets:
         return cls(reports, time_origin, cleaning or Cleaning())
 
     def truth(self, times: ArrayLike, *, rng: np.random.Generator) -> Truth:
-        """Return the tracks at the scan times, with the first scan at `time_origin`; `rng` is not used.
+        """Return the tracks at the scan times, with the first scan at `time_origin`. `rng` is not used.
 
         Raises:
             InputError: no track exists at any of the scans.

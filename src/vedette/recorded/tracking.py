@@ -26,7 +26,7 @@ class Tracking:
         recording: the scans.
         tracker: of its sensors.
         estimate: estimates the targets from the fused belief, given the number of the instant (from 1).
-        truth: the targets at the times of the recording; no targets if they are unknown.
+        truth: the targets at the times of the recording, or no targets if they are unknown.
 
     Raises:
         InputError: a tracker of other sensors, or targets at other times.
@@ -52,10 +52,10 @@ class Tracking:
     def run(
         self, score: Score | None, *, seed: int = 0, run: int = 0, progress: Callable[[int], None] | None = None
     ) -> RunRecord:
-        """Track the targets; raises `RunStopped` and `RunInterrupted` like `vedette.simulation.simulate`.
+        """Track the targets. Raises `RunStopped` and `RunInterrupted` like `vedette.simulation.simulate`.
 
         Args:
-            score: (num_scans, 3) OSPA of the estimates against the truth; None: NaN.
+            score: (num_scans, 3) OSPA of the estimates against the truth. None: NaN.
             seed, run: fix the random numbers of filters that draw.
             progress: called with the number of each instant after it.
         """

@@ -27,7 +27,7 @@ _SECTORS, _NEAR = 72, 12  # directions in which rows are counted, and how many o
 
 
 def bearings_of(scan: Floats, poses: Floats, kind: str) -> Floats:
-    """Return bearings from east, rad, of measurements from poses (num, 3 or more) or (3 or more,); empty if none."""
+    """Return bearings from east, rad, of measurements from poses (num, 3 or more) or (3 or more,), empty if none."""
     if is_position(kind):
         off = scan[:, :2] - poses[..., :2]
         return np.asarray(np.arctan2(off[:, 1], off[:, 0]))
@@ -51,7 +51,7 @@ class Swept(NamedTuple):
 
 
 def found_turn(times: Floats, bearings: Floats) -> Turn | None:
-    """Return the turn that the rows of a radar show; None without one.
+    """Return the turn that the rows of a radar show, or None without one.
 
     This is the slowest turn that explains the bearings by the times. A faster one may pass the same directions at the
     same times. Rows with equal times and different bearings rule a turn out.
@@ -126,7 +126,7 @@ class _Beam:
 def scans_of_turns(
     times: Floats, bearings: Floats, poses: Floats, turning: Turning, service: RadarService | None = None
 ) -> list[Swept] | None:
-    """Return the scans of a turning radar; None if it does not turn, or no turn is given or found. See `swept`."""
+    """Return the scans of a turning radar, or None if it does not turn, or no turn is given or found. See `swept`."""
     if turning == "none" or not len(bearings):
         return None
     if service is not None and turning == "found":
@@ -145,7 +145,7 @@ def swept(times: Floats, bearings: Floats, poses: Floats, turn: Turn, span: Floa
         times: (num_rows,) s, increasing.
         bearings: (num_rows,) rad from east.
         poses: (num_rows, 3 or more) of the sensor at each row.
-        turn: nominal turn; the rows refine it.
+        turn: nominal turn. The rows refine it.
         span: (2,) s, the turns from the first to the last of these times, which include those of all rows.
     """
     beam = _Beam(times, bearings, turn)

@@ -19,9 +19,9 @@ _WORDS = {"of_targets": "gain by target", "of_sensors": "shares of the sensors",
 
 
 def explanation_data(plan: Plan, names: Sequence[str] = ()) -> dict[str, Any] | None:
-    """Return the data that the page shows, with the sensors' names; None for a decision stored without explanation.
+    """Return the data that the page shows, with the sensors' names, or None for a decision stored without explanation.
 
-    Facts as pairs of texts; label and gains of the ten targets with the largest gains, and number and sums of the
+    Facts as pairs of texts: label and gains of the ten targets with the largest gains, and number and sums of the
     others; the gain from targets not detected before; the cost of the actions; and for each sensor its number, action,
     share, and the reward without it.
     """
@@ -95,5 +95,5 @@ def _sensors(plan: Plan, explanation: Explanation) -> list[tuple[int, str, float
 
 
 def _number(value: float, least: float = 0.0) -> float:
-    """Return a number with four significant digits; 0 if it is not finite or smaller than `least`."""
+    """Return a number with four significant digits, or 0 if it is not finite or smaller than `least`."""
     return float(f"{value:.4g}") if math.isfinite(value) and abs(value) >= least else 0.0

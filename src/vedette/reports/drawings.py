@@ -82,7 +82,7 @@ def _tracks_drawings(group: Group) -> Iterator[Drawing]:
 
 
 def error_drawings(group: Group) -> Iterator[Drawing]:
-    """Yield only the figures of the error; none without a comparison."""
+    """Yield only the figures of the error, or none without a comparison."""
     if group.comparison is None:
         return
     comparison = group.comparison
@@ -166,7 +166,7 @@ def _rewards(strategy: Strategy) -> Figure | None:
 
 
 def typical_records(group: Group) -> tuple[tuple[Strategy, RunRecord], ...]:
-    """Return for each strategy the run with the median of the mean OSPA; without a comparison its first run."""
+    """Return for each strategy the run with the median of the mean OSPA, or without a comparison its first run."""
     typical = []
     for strategy in group.strategies:
         index = 0 if group.comparison is None else typical_run(group.comparison, strategy.label)
@@ -175,7 +175,7 @@ def typical_records(group: Group) -> tuple[tuple[Strategy, RunRecord], ...]:
 
 
 def paired_records(group: Group) -> tuple[tuple[Strategy, RunRecord], ...]:
-    """Return under each strategy the run that is typical of the first; without a comparison, the first run of each."""
+    """Return under each strategy the run that is typical of the first, or without comparison, the first of each."""
     comparison = group.comparison
     if comparison is None:
         return typical_records(group)
@@ -205,7 +205,7 @@ def sweep_drawings(campaign: Campaign, errors: Mapping[str, Floats]) -> Iterator
 
     Args:
         campaign: the campaign.
-        errors: mean OSPA of the paired runs, by cell name; cells without are left out.
+        errors: mean OSPA of the paired runs, by cell name. Cells without are left out.
     """
     cells = [cell for cell in campaign.cells if cell.name in errors]
     for axis, values in campaign.axes.items():

@@ -26,9 +26,9 @@ class ForestRow:
         colour: index of the strategy, which determines its colour.
         error: mean OSPA with its standard error.
         mean, low, high: positions of the difference and of the ends of its interval on the axis, in percent of the
-            width; None for the first strategy, and for the interval of one run.
+            width, or None for the first strategy, and for the interval of one run.
         difference: the same as text.
-        verdict: class of the verdict on the difference; `reference` for the first strategy.
+        verdict: class of the verdict on the difference, `reference` for the first strategy.
         verdict_words: the verdict in words.
         sentence: the finding.
     """
@@ -67,7 +67,7 @@ class Forest:
 
 
 def forest_of(group: Group) -> Forest | None:
-    """Return the forest plot of a group; None without runs in common or with a single strategy."""
+    """Return the forest plot of a group, or None without runs in common or with a single strategy."""
     comparison = group.comparison
     if comparison is None or len(comparison.strategies) < 2:
         return None

@@ -1,4 +1,4 @@
-"""Runs of a campaign grouped for comparison; a single run as a group of its own."""
+"""Runs of a campaign grouped for comparison, or a single run as a group of its own."""
 
 from __future__ import annotations
 
@@ -35,8 +35,8 @@ class Strategy:
         cell: strategy and setting.
         label: value of the compared axis, as text.
         num_finished: number of finished runs.
-        ensemble: the common runs of the group; all finished runs if there are no common ones.
-        counted: (num_scans,) whether a scan counts in means over time; all of them without a comparison.
+        ensemble: the common runs of the group, or all finished runs if there are no common ones.
+        counted: (num_scans,) whether a scan counts in means over time, all of them without a comparison.
         record: function from the number of one of these runs to its record.
     """
 
@@ -54,7 +54,7 @@ class Strategy:
 
     @property
     def words(self) -> str:
-        """Description of the planner; empty if another axis than the planner is compared."""
+        """Description of the planner, empty if another axis than the planner is compared."""
         return self.cell.words if self.label == self.cell.planner else ""
 
     @property
@@ -73,12 +73,12 @@ class Group:
     """Strategies that differ only in the compared axis.
 
     Attributes:
-        name: fit for a file name and an anchor; unique in the campaign.
+        name: fit for a file name and an anchor, unique in the campaign.
         title: settings that distinguish the group from the others.
         strategies: in the order of the specification, without those that have no finished run.
         missing: names of strategies without a finished run.
-        comparison: over the common runs, with the labels as names of its strategies; None if there are none.
-        reason: why there is no comparison; empty if there is one.
+        comparison: over the common runs, with the labels as names of its strategies, or None if there are none.
+        reason: why there is no comparison, empty if there is one.
     """
 
     name: str
@@ -126,7 +126,7 @@ def _counted(ensemble: Ensemble, comparison: Comparison | None) -> Bools:
 
 
 def group_of_run(record: RunRecord, scenario: Scenario) -> Group:
-    """Return a run as a group of its own, without comparison partners; measured if the true targets are known.
+    """Return a run as a group of its own, without comparison partners, measured if the true targets are known.
 
     Raises:
         InputError: the run has other sensors than the scenario.
@@ -165,7 +165,7 @@ def _describe(cell: Cell, axis: str) -> str:
 
 
 def _label(axis: str, value: Any) -> str:
-    """Return a value of the compared axis as text; numbers with the name of the axis."""
+    """Return a value of the compared axis as text, numbers with the name of the axis."""
     return f"{axis_label(axis)} {_short(value)}" if isinstance(value, bool | int | float) else str(value)
 
 
@@ -180,7 +180,7 @@ def axis_label(axis: str) -> str:
 
 
 def axis_unit(cell: Cell, axis: str) -> str:
-    """Return the unit of the scenario field that an axis varies, from its description; empty if it has none."""
+    """Return the unit of the scenario field that an axis varies, from its description, empty if it has none."""
     section: Any = cell.scenario.model
     *path, name = axis.split(".")
     for part in path:

@@ -23,7 +23,7 @@ class DiagnosticsTable:
 
     Attributes:
         strategies: names, one per column.
-        rows: one diagnostic per strategy; those of a row have the same name and meaning.
+        rows: one diagnostic per strategy. Those of a row have the same name and meaning.
     """
 
     strategies: tuple[str, ...]
@@ -31,14 +31,14 @@ class DiagnosticsTable:
 
 
 def diagnostics_table(group: Group) -> DiagnosticsTable | None:
-    """Return the diagnostics of a group; None if every check of every strategy is `ok`."""
+    """Return the diagnostics of a group, or None if every check of every strategy is `ok`."""
     columns = [tuple(strategy_diagnostics(each)) for each in group.strategies]
     rows = tuple(row for row in zip(*columns, strict=True) if any(each.level != "ok" for each in row))
     return DiagnosticsTable(tuple(each.name for each in group.strategies), rows) if rows else None
 
 
 def strategy_diagnostics(strategy: Strategy) -> Iterator[Diagnostic]:
-    """Yield every check of a strategy: of lost targets, covariances, fusion, filters; new targets (first run)."""
+    """Yield every check of a strategy: of lost targets, covariances, fusion, filters, and new targets (first run)."""
     yield _missed(strategy)
     yield _consistency(strategy)
     yield _worst_estimate(strategy)

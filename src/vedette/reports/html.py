@@ -46,7 +46,7 @@ _FILES = resources.files("vedette.reports") / "page"
 
 @dataclass(frozen=True, slots=True)
 class _Section:
-    """Part of the page about one group; `is_brief` if it shows only the figures of the error."""
+    """Part of the page about one group. `is_brief` if it shows only the figures of the error."""
 
     title: str
     finished: tuple[tuple[str, int], ...]  # strategies and their numbers of runs
@@ -74,15 +74,15 @@ class _Section:
 def write_report(
     results: CampaignResults, path: str | Path, *, replays: Sequence[tuple[str, int]] | None = None, trust: bool = False
 ) -> None:
-    """Write a campaign's report as one self-contained HTML file; equal results give equal bytes.
+    """Write a campaign's report as one self-contained HTML file. Equal results give equal bytes.
 
     Without `trust` no code that the results name is imported or run. If drawing the measurements of a replay requires a
     custom sensor model, they are then left out, and the page states it.
 
     Args:
         results: results of a finished campaign.
-        path: path of the file; missing folders are made.
-        replays: cell and number of the runs to replay; None: the typical run of the first strategy, under every
+        path: path of the file. Missing folders are made.
+        replays: cell and number of the runs to replay. None: the typical run of the first strategy, under every
             strategy, as many as keep the page small.
         trust: run the code that the scenarios of the results name (`replay_code`).
 
@@ -134,13 +134,13 @@ def write_report(
 
 
 def write_demo(results: CampaignResults, path: str | Path, *, trust: bool = False) -> Path:
-    """Write a page that shows the first run of the strategies of a campaign side by side; return its path.
+    """Write a page that shows the first run of the strategies of a campaign side by side, and return its path.
 
     The page is self-contained, and equal results give equal bytes.
 
     Args:
         results: results of a campaign on one scenario, with a finished run of each strategy.
-        path: path of the file; missing folders are made.
+        path: path of the file. Missing folders are made.
         trust: run the code that the scenario names, to draw measurements (see `write_report`).
 
     Raises:
@@ -200,7 +200,7 @@ def _misplaced(path: Path, error: OSError) -> InputError:
 
 
 def section_of(group: Group, prefix: str, is_brief: bool = False) -> _Section:
-    """Return the part of a page about a group; `prefix` must be unique on the page."""
+    """Return the part of a page about a group. `prefix` must be unique on the page."""
     named = {
         "Errors": error_table(group),
         "Other measures": measure_table(group),

@@ -43,7 +43,7 @@ _STEPS_OF_EXTENT = 10.0
 
 @dataclass(slots=True)
 class LastPlanCache:
-    """Planner that stores its last plan; plans are those of the wrapped planner."""
+    """Planner that stores its last plan. Plans are those of the wrapped planner."""
 
     planner: Planner
     last: Plan | None = None
@@ -66,7 +66,7 @@ class LiveScreen:
 
     Args:
         scenario: scenario of the loop.
-        live: the loop; use `live` of this screen instead, which makes its plans visible here.
+        live: the loop. Use `live` of this screen instead, which makes its plans visible here.
         state: returns the state of the loop.
 
     Attributes:

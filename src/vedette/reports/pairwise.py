@@ -26,9 +26,9 @@ class PairwiseComparison:
             It is corrected for the number of pairs (Holm).
         first, second: names of the strategies.
         sentence: the finding with its numbers.
-        mean, low, high: paired difference in mean OSPA, second minus first, with its 95 % interval; NaN for one run.
+        mean, low, high: paired difference in mean OSPA, second minus first, with its 95 % interval, or NaN for one run.
         difference: the same as text: "+1.20 (+0.80 to +1.60)".
-        win_rate: share of the runs in which `first` is better: "93 %"; "unknown" for one run.
+        win_rate: share of the runs in which `first` is better: "93 %", or "unknown" for one run.
     """
 
     verdict: Verdict

@@ -10,7 +10,7 @@ from vedette.reports.tables import Table
 
 
 def spec_toml(spec: Mapping[str, Any]) -> str:
-    """Return plain data as TOML text, tables after values; entries that are None or empty are left out."""
+    """Return plain data as TOML text, tables after values. Entries that are None or empty are left out."""
     return "\n".join(_lines(spec, ())).strip() + "\n"
 
 

@@ -34,10 +34,10 @@ _LEAST_EXTENT = 1.0  # m
 
 
 def replay_data(strategy: Strategy, record: RunRecord, group: str, *, trust: bool) -> dict[str, Any]:
-    """Return the data of a run for the page, as plain JSON types; positions are rounded to what is visible.
+    """Return the data of a run for the page, as plain JSON types. Positions are rounded to what is visible.
 
     Measurements are those of the recording, or drawn again by the sensor models. They are left out if a sensor gives no
-    position in the plane, or if they cannot be drawn; without `trust` also if drawing them would run code that the
+    position in the plane, or if they cannot be drawn, or without `trust` also if drawing them would run code that the
     scenario names. Without known targets there are no errors.
     """
     scenario = strategy.cell.scenario
@@ -97,7 +97,7 @@ def decimals_for(extent: Sequence[float]) -> int:
 
 
 def _extent(record: RunRecord, scenario: Scenario) -> tuple[float, float, float, float]:
-    """Return x_min, x_max, y_min, y_max of sensors and targets with a margin, m; of estimates if targets are unknown.
+    """Return x_min, x_max, y_min, y_max of sensors and targets with a margin, m (of estimates if targets are unknown).
 
     A scene without extent, such as one sensor without measurements, gets that of the region.
     """
@@ -129,7 +129,7 @@ def sensor_data(name: str, section: SensorSection) -> dict[str, Any]:
 
 
 def pose_data(pose: Floats, section: SensorSection, decimals: int) -> list[float]:
-    """Return position and heading; for a camera also its field of view: middle and half width in rad, reach in m."""
+    """Return position and heading, for a camera also its field of view: middle and half width in rad, reach in m."""
     pose_numbers = [*rounded_list(pose[:2], decimals), round(float(pose[2]), 4)]
     if section.detection.kind == "camera":
         field = field_of_view(section, pose.tolist())
@@ -150,7 +150,7 @@ def _estimates(record: RunRecord, scenario: Scenario, decimals: int) -> list[lis
     """Return the estimates of each scan with the matched targets.
 
     Each has label, position, existence, ellipse (semi-axes in m, angle in rad), matched target, and error. Target and
-    error are those of the assignment in OSPA; 0 and 0 for an unmatched estimate.
+    error are those of the assignment in OSPA, and 0 and 0 for an unmatched estimate.
     """
     score = scenario.model.ospa
     matching = match_run(record.truth, record.estimates, cutoff=score.cutoff, order=score.order)

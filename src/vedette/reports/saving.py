@@ -21,7 +21,7 @@ MARKDOWN, CSV = "summary.md", "summary.csv"
 
 
 def write_summary(results: CampaignResults, folder: Path) -> tuple[Path, ...]:
-    """Write the comparison of every group into `summary.md` and, unrounded, `summary.csv`; return both paths.
+    """Write the comparison of every group into `summary.md` and, unrounded, `summary.csv`, and return both paths.
 
     Raises:
         InputError: the folder cannot be written.
@@ -50,7 +50,7 @@ _LONGEST_NAME, _START, _END = 75, 45, 20  # bytes
 
 
 def write_figures(results: CampaignResults, path: str | Path) -> tuple[Path, ...]:
-    """Write every figure of the report into a folder as PDF, SVG and PNG; equal results give equal bytes.
+    """Write every figure of the report into a folder as PDF, SVG and PNG. Equal results give equal bytes.
 
     With several groups, file names begin with that of the group. Returns the files written.
 
@@ -73,7 +73,7 @@ def write_figures(results: CampaignResults, path: str | Path) -> tuple[Path, ...
 
 
 def write_run_figures(record: RunRecord, scenario: Scenario, path: str | Path) -> tuple[Path, ...]:
-    """Write every figure of the report of a single run; otherwise as `write_figures`."""
+    """Write every figure of the report of a single run, otherwise as `write_figures`."""
     return tuple(_save(group_drawings(group_of_run(record, scenario)), _made(path)))
 
 
@@ -95,7 +95,7 @@ def _save(drawings: Iterable[Drawing], folder: Path, prefix: str = "") -> list[P
 
 
 def _file_name(name: str) -> str:
-    """Return a name for a file; a long one is shortened to both ends with a digest between them."""
+    """Return a name for a file. A long one is shortened to both ends with a digest between them."""
     if len(name.encode()) <= _LONGEST_NAME:
         return name
     digest = hashlib.sha256(name.encode()).hexdigest()[:8]
@@ -104,7 +104,7 @@ def _file_name(name: str) -> str:
 
 
 def run_errors(group: Group) -> dict[str, Floats]:
-    """(num_runs,) mean OSPA of the runs of each cell of a group; empty without common runs."""
+    """(num_runs,) mean OSPA of the runs of each cell of a group, empty without common runs."""
     if group.comparison is None:
         return {}
     comparison = group.comparison

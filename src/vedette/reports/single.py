@@ -25,15 +25,15 @@ def write_run_report(
     manifest: Mapping[str, Any] | None = None,
     trust: bool = False,
 ) -> None:
-    """Write the report of one run as one self-contained HTML file; equal runs give equal bytes.
+    """Write the report of one run as one self-contained HTML file. Equal runs give equal bytes.
 
     The replay of recorded scans shows those of the recording. Without known targets there are no errors.
 
     Args:
         record: the run.
         scenario: the scenario of the run.
-        path: path of the file; missing folders are made.
-        manifest: manifest of the run's folder, with the versions of the program; None: no versions are shown.
+        path: path of the file. Missing folders are made.
+        manifest: manifest of the run's folder, with the versions of the program. None: no versions are shown.
         trust: run the code that the scenario names, to draw measurements (see `write_report`).
 
     Raises:

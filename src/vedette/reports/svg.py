@@ -43,7 +43,7 @@ def inline_svg(figure: Figure, prefix: str, description: str, names: Mapping[str
 
     Args:
         figure: the figure.
-        prefix: prefix of every id in the figure; unique on the page.
+        prefix: prefix of every id in the figure, unique on the page.
         description: description for screen readers.
         names: elided names and the full ones, shown as tooltips of texts that contain the elided ones.
     """

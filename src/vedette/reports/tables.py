@@ -31,13 +31,13 @@ Measure = Callable[[Ensemble, Bools], Floats]
 
 @dataclass(frozen=True, slots=True)
 class Table:
-    """Cells of text under a header; the first column names the rows.
+    """Cells of text under a header. The first column names the rows.
 
     Attributes:
         caption: description of the numbers.
         header: one entry per column.
         rows: as long as the header.
-        notes: descriptions of the rows where the names do not suffice; may be empty.
+        notes: descriptions of the rows where the names do not suffice. May be empty.
         is_words: whether the cells are words rather than numbers.
     """
 
@@ -54,7 +54,7 @@ class Table:
 
     @property
     def short_names(self) -> tuple[str, ...]:
-        """Names of the rows; long ones are elided if a name occurs in several rows."""
+        """Names of the rows. Long ones are elided if a name occurs in several rows."""
         names = [row[0] for row in self.rows]
         distinct = list(dict.fromkeys(names))
         if len(distinct) == len(names):
@@ -90,7 +90,7 @@ class _Kind:
 
 
 def _kinds(order: float) -> tuple[_Kind, ...]:
-    """Return the metrics of a run; `order` is that of OSPA, and the parts of GOSPA have that power."""
+    """Return the metrics of a run. `order` is that of OSPA, and the parts of GOSPA have that power."""
     power = "m" if order == 1.0 else f"m^{order:g}"
     bias = "estimated minus true number of targets, mean over the scans"
     return (
@@ -115,7 +115,7 @@ def _own_kinds(strategies: Sequence[Strategy]) -> Iterator[_Kind]:
 
 
 def error_table(group: Group) -> Table | None:
-    """Return OSPA and its parts, and the paired differences; None without common runs."""
+    """Return OSPA and its parts, and the paired differences, or None without common runs."""
     if group.comparison is None:
         return None
     several_runs = group.comparison.num_runs > 1
@@ -149,7 +149,7 @@ def error_table(group: Group) -> Table | None:
 
 
 def measure_table(group: Group) -> Table | None:
-    """Return the metrics other than OSPA, one column per strategy; None if there are none."""
+    """Return the metrics other than OSPA, one column per strategy, or None if there are none."""
     strategies = [strategy for strategy in group.strategies if strategy.ensemble.measures]
     if not strategies:
         return None
@@ -206,7 +206,7 @@ class NeesSpread:
     Attributes:
         median: median of the means at the scans of all runs.
         largest: largest value of a single estimate.
-        run, time: run and time of that estimate; time in s.
+        run, time: run and time of that estimate, the time in s.
         is_by_chance: whether a consistent filter exceeds it in more than one of a thousand such comparisons.
     """
 
@@ -218,7 +218,7 @@ class NeesSpread:
 
 
 def nees_spread(strategy: Strategy) -> NeesSpread | None:
-    """Return the spread over the counted scans; None if no estimate is matched."""
+    """Return the spread over the counted scans, or None if no estimate is matched."""
     ensemble, counted = strategy.ensemble, strategy.counted
     means, largest = (ensemble.values(f"position_nees_{name}")[:, counted] / 2.0 for name in ("mean", "max"))
     if np.isnan(largest).all():
@@ -268,7 +268,7 @@ def stage_seconds(strategy: Strategy) -> dict[str, NDArray[np.float32]]:
 
 
 def cost_table(group: Group) -> Table | None:
-    """Return the time of each stage: median and 95th percentile, one column per strategy; None if nothing was timed."""
+    """Return the time of each stage: median and 95th percentile, a column per strategy (None if nothing was timed)."""
     seconds_of = {strategy.name: stage_seconds(strategy) for strategy in group.strategies}
     stages = list(dict.fromkeys(stage for seconds in seconds_of.values() for stage in seconds))
     if not stages:
@@ -295,7 +295,7 @@ def _three_digits(value: float) -> str:
 
 
 def decision_table(group: Group) -> Table | None:
-    """Return the most frequent choices at each decision; None if no decision was made."""
+    """Return the most frequent choices at each decision, or None if no decision was made."""
     if group.comparison is None:
         return None
     rows = [

@@ -64,14 +64,14 @@ class Layout:
 
     Attributes:
         fixed: required columns.
-        more: prefixes of optional columns, of which there may be any number; the empty text: any name.
+        more: prefixes of optional columns, of which there may be any number. The empty text: any name.
     """
 
     fixed: Mapping[str, Kind]
     more: Mapping[str, Kind] = field(default_factory=dict)
 
     def kind(self, name: str) -> Kind | None:
-        """Return the type of the column of that name; None if the table has no such column."""
+        """Return the type of the column of that name, or None if the table has no such column."""
         if name in self.fixed:
             return self.fixed[name]
         return next((kind for start, kind in self.more.items() if name.startswith(start)), None)
@@ -87,10 +87,10 @@ def stacked(
     """Concatenate tables.
 
     Args:
-        parts: columns of each table; a single value is repeated in every row of its part.
+        parts: columns of each table. A single value is repeated in every row of its part.
         layout: layout of the result. Columns that a part lacks are filled with NaN, or -1 for a count.
-        names: names of all columns, in order; none: the fixed ones and then the other columns of the parts.
-        num_rows: rows of each part; none: the length of its columns, one if all are single values.
+        names: names of all columns, in order. none: the fixed ones and then the other columns of the parts.
+        num_rows: rows of each part. none: the length of its columns, one if all are single values.
 
     Raises `InputError` for a column that is not among the names.
     """
@@ -120,7 +120,7 @@ def _joined(column: list[Any], lengths: Sequence[int], kind: Kind) -> Any:
 
 
 def to_arrow(columns: Columns, layout: Layout, *, nan_is_null: bool = False) -> pa.RecordBatch:
-    """Return the table in Arrow; with `nan_is_null` for tools that would treat NaN as a number.
+    """Return the table in Arrow, with `nan_is_null` for tools that would treat NaN as a number.
 
     Raises `InputError` for a column that the layout does not have, and for columns of unequal lengths.
     """
@@ -175,7 +175,7 @@ def _bits(truths: Bools) -> NDArray[np.uint8]:
 
 
 def _values(column: pa.Array, kind: Kind) -> NDArray[Any]:
-    """Return the numbers of a column as a copy; -1 or NaN for null."""
+    """Return the numbers of a column as a copy, with -1 or NaN for null."""
     validity, content = column.buffers()
     bits = slice(column.offset, column.offset + len(column))
     if kind is Kind.TRUTH:
@@ -271,7 +271,7 @@ def _is_compressed(metadata: bytes) -> bool:
 
 @lru_cache(maxsize=256)
 def _described(message: bytes, layout: Layout) -> tuple[pa.Schema, dict[str, Kind]]:
-    """Return the schema of a message, and the type of each column; raises `InputError` for columns not in the layout.
+    """Return the schema of a message, and the type of each column. Raises `InputError` for columns not in the layout.
 
     Cached, as tables of a thousand runs have only a few schemas.
     """

@@ -26,7 +26,7 @@ class PoissonTargets:
         mean: (state_dim,) mean of an initial state.
         cov: (state_dim, state_dim) covariance of an initial state, positive semidefinite.
         death_probability: probability that a target dies between two scans.
-        region: region of the targets; None: unbounded.
+        region: region of the targets. None: unbounded.
 
     Raises:
         InputError: names the field, the expected and the given value.
@@ -48,7 +48,7 @@ class PoissonTargets:
         semidefinite_factor(self.cov)
 
     def truth(self, times: ArrayLike, *, rng: np.random.Generator) -> Truth:
-        """Draw all births, scan by scan; then the life of each target.
+        """Draw all births, scan by scan, then the life of each target.
 
         Raises:
             InputError: the scan times do not increase.

@@ -197,7 +197,7 @@ def _notes(plan: Plan) -> str:
 
 
 def _actions(decisions: Sequence[Decision]) -> Columns:
-    """Return one row per decision, sensor and action; null if a sensor has no such column."""
+    """Return one row per decision, sensor and action, null if a sensor has no such column."""
     layout = DECISION_TABLES["actions"]
     parts = [
         {
@@ -243,7 +243,7 @@ def _rows_of(rewards: Mapping[str, Any]) -> Iterator[tuple[int, slice]]:
 
 
 def parts_of(table: Mapping[str, Any], name: str, num: int | None = None) -> list[Columns]:
-    """Return the rows of each number from 0 to `num` - 1, in order; without `num`, of every number up to the last."""
+    """Return the rows of each number from 0 to `num` - 1, in order (without `num`, of every number up to the last)."""
     numbers: Ints = table[name]
     if num is None and len(numbers) and (numbers[0] != 0 or np.any(np.diff(numbers) > 1)):
         raise InputError(f"column {name}: expected rows of every number from 0")

@@ -27,14 +27,14 @@ class Experiment(SummaryRepr):
         targets: source of the true targets.
         tracker: the tracker.
         platforms: platform of each sensor.
-        poses: (num_sensors, 3 or more) poses at the first scan, all as long as the longest; components that a sensor
+        poses: (num_sensors, 3 or more) poses at the first scan, all as long as the longest. Components that a sensor
             does not have are 0.
-        first_actions: per sensor, the row of its initial action; None: it does not move until the first decision.
+        first_actions: per sensor, the row of its initial action. None: it does not move until the first decision.
         estimate: extracts the targets from the fused density, given the number of the scan (from 1).
         decision_steps: scans (counted from 1) that are followed by a decision.
-        true_sensors: the sensors that scan; (): they equal the sensor models of the tracker.
-        scans_at: (num_sensors, num_scans or more) whether each sensor scans; None: at every step.
-        scan_loss_probability: probability of each sensor that a scan is lost; (): none.
+        true_sensors: the sensors that scan. (): they equal the sensor models of the tracker.
+        scans_at: (num_sensors, num_scans or more) whether each sensor scans. None: at every step.
+        scan_loss_probability: probability of each sensor that a scan is lost. (): none.
         explain: whether decisions are stored with their explanations, see `vedette.control.Plan.explain`.
 
     Raises:
@@ -94,14 +94,14 @@ class Experiment(SummaryRepr):
         return len(self.tracker.sensors)
 
     def sensors_at(self, step: int, scans_at: Bools | None = None) -> tuple[TrueSensor | None, ...]:
-        """Return the true sensors at a step (from 1); None for one that does not scan then.
+        """Return the true sensors at a step (from 1), or None for one that does not scan then.
 
-        scans_at: scans of the run, see `vedette.simulation.loop.scan_flags_of_run`; None: without lost scans.
+        scans_at: scans of the run, see `vedette.simulation.loop.scan_flags_of_run`. None: without lost scans.
         """
         times = self.scans_at if scans_at is None else scans_at
         return sensors_at_step(self._scanning, times, step)
 
     def fleet(self, *, moving: bool = True) -> Fleet:
-        """Return the platforms at the first scan; without an initial action, or if not `moving`, they do not move."""
+        """Return the platforms at the first scan. Without an initial action, or if not `moving`, they do not move."""
         actions = self.first_actions if moving else (None,) * self.num_sensors
         return Fleet(self.platforms, self.poses, actions, float(self.times[0]))

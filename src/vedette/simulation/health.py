@@ -22,7 +22,7 @@ _FUSION = "fusion_"  # prefix of the names for the fusion as a whole
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
 class Health(SummaryRepr):
-    """Reports of all filters and fusions of a run; names and meaning as in `FilterInfo` and `FusionInfo`.
+    """Reports of all filters and fusions of a run, with names and meaning as in `FilterInfo` and `FusionInfo`.
 
     Arrays have the shape (num_scans, num_sensors), those of the fusion as a whole (`fusion_...`) (num_scans,). Booleans
     are 0 or 1. Without a fusion, or with a custom one that reports no `FusionInfo`, its numbers are 0. The report of
@@ -31,7 +31,7 @@ class Health(SummaryRepr):
     Attributes:
         log_likelihood: log likelihood of the scan, given the prior.
         num_hypotheses, num_tracks: size of the posterior.
-        truncation_error_bound: upper bound on the truncated share of posterior weight; NaN if unknown.
+        truncation_error_bound: upper bound on the truncated share of posterior weight, or NaN if unknown.
         dropped_existence: expected number of targets in dropped labels.
         num_clutter_floored: measurements whose clutter intensity was raised to its floor.
         num_duplicates: measurements left out because they repeat another.
@@ -41,7 +41,7 @@ class Health(SummaryRepr):
         independence_error_bound: upper bound on the L1 error of treating labels as independent, for factored densities.
         num_missing_sets: label sets that another sensor has and this one does not (for CLMB, labels).
         num_missing_labels: labels that this sensor does not know at all.
-        bytes_sent: bytes that this sensor sent by radio, or to the fusion centre; 0 if not counted.
+        bytes_sent: bytes that this sensor sent by radio, or to the fusion centre, or 0 if not counted.
         fusion_num_sets: label sets that were fused (for CLMB, labels).
         fusion_num_lost_labels: labels that are certain at a sensor and not in the fused density.
         fusion_empty_intersection: whether no label set is held by every sensor.
@@ -85,7 +85,7 @@ class Health(SummaryRepr):
         return Health(**{name: getattr(self, name)[:num_scans] for name in _DTYPES})
 
     def note_filters(self, scan: int, infos: Sequence[FilterInfo]) -> None:
-        """Record the reports of the filters, one per sensor or one for all; scans are counted from 0.
+        """Record the reports of the filters, one per sensor or one for all. Scans are counted from 0.
 
         Raises `InputError` for another number of reports, or another type.
         """
@@ -110,7 +110,7 @@ class Health(SummaryRepr):
                 getattr(self, name)[scan] = getattr(info, name.removeprefix(_FUSION))
 
     def note_sent(self, scan: int, bytes_sent: Sequence[int]) -> None:
-        """Record the bytes sent by each sensor; nothing is counted if `bytes_sent` is empty.
+        """Record the bytes sent by each sensor. Nothing is counted if `bytes_sent` is empty.
 
         Raises `InputError` unless there is one number per sensor.
         """

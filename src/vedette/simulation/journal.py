@@ -28,7 +28,7 @@ _LIBRARIES = (str(Path(__file__).parents[1]), *(sysconfig.get_path(name) for nam
 
 
 def error_cause(error: Exception) -> str:
-    """Return the message of an error; with its type and place in the user's code if the library did not raise it."""
+    """Return the message of an error, with its type and place in the user's code if the library did not raise it."""
     if isinstance(error, VedetteError):
         return str(error)
     frames = [frame for frame in traceback.extract_tb(error.__traceback__) if not frame.filename.startswith(_LIBRARIES)]
@@ -37,13 +37,13 @@ def error_cause(error: Exception) -> str:
 
 
 class RunStopped(VedetteError):
-    """A filter, a fusion, an estimator or a planner raised during a run; chained from that error.
+    """A filter, a fusion, an estimator or a planner raised during a run, chained from that error.
 
     Attributes:
         step: scan at which it happened, counted from 1.
         time: time of that scan, s.
         stage: stage that failed, in words: "the filter of sensor 2".
-        record: record of the finished scans, with the message in its field `stopped`; None if there are none.
+        record: record of the finished scans, with the message in its field `stopped`, or None if there are none.
     """
 
     def __init__(self, message: str, step: int, time: float, stage: str, record: RunRecord | None) -> None:
@@ -61,7 +61,7 @@ class RunInterrupted(KeyboardInterrupt):
     """Ctrl-C during a run.
 
     Attributes:
-        record: record of the finished scans, with the message in its field `stopped`; None if there are none.
+        record: record of the finished scans, with the message in its field `stopped`, or None if there are none.
     """
 
     def __init__(self, message: str, record: RunRecord | None) -> None:
@@ -70,7 +70,7 @@ class RunInterrupted(KeyboardInterrupt):
 
 
 class Journal:
-    """Scans of a run that have an estimate; `step` is the present scan, counted from 1."""
+    """Scans of a run that have an estimate. `step` is the present scan, counted from 1."""
 
     def __init__(
         self,
@@ -82,7 +82,7 @@ class Journal:
         num_sensors: int,
         file: ScansFile | None = None,
     ) -> None:
-        """Create an empty journal. file: file of recorded scans; None: scans are simulated."""
+        """Create an empty journal. file: file of recorded scans. None: scans are simulated."""
         self.scenario, self.planner, self.seed, self.run = scenario, planner, seed, run
         self.truth, self.file = truth, file
         self.step = 1
@@ -100,7 +100,7 @@ class Journal:
         return float(self.truth.times[self.step - 1])
 
     def begin(self, step: int) -> StageTimer:
-        """Start a scan; return its stage timer."""
+        """Start a scan, and return its stage timer."""
         self.step = step
         if step > 1:
             self._clocks.append(StageTimer())
@@ -164,7 +164,7 @@ class Journal:
         return seconds | {"filter": np.maximum(seconds["filter"] - fusion, 0.0), "fusion": fusion}
 
     def _partial(self, score: Score | None, stopped: str) -> RunRecord | None:
-        """Return the record of a run that stopped; None if no scan is finished.
+        """Return the record of a run that stopped, or None if no scan is finished.
 
         OSPA is NaN if it cannot be computed.
         """
@@ -180,14 +180,14 @@ class Journal:
         return np.full((num, 3), np.nan) if score is None else score(self.truth.first(num), self.estimates)
 
     def run_of(self, go: Callable[[], None], score: Score | None) -> RunRecord:
-        """Return the record of a run; `go` processes its scans and notes each of them here.
+        """Return the record of a run. `go` processes its scans and notes each of them here.
 
         Args:
             go: processes the scans, one after the other.
-            score: (num_scans, 3) OSPA of the estimates against the truth; None: NaN.
+            score: (num_scans, 3) OSPA of the estimates against the truth. None: NaN.
 
         Raises:
-            RunStopped: `go` or the score raised; it is chained from that.
+            RunStopped: `go` or the score raised. It is chained from that.
             RunInterrupted: a `KeyboardInterrupt`, likewise.
         """
         try:

@@ -37,7 +37,7 @@ def sensor_streams(seed: int, run: int, stream: int, num_sensors: int) -> tuple[
 def scan_flags_of_run(
     scans_at: Bools | None, scan_loss_probability: Sequence[float], num_scans: int, seed: int, run: int
 ) -> Bools | None:
-    """(num_sensors, num_scans or more) whether each sensor scans in a run, without lost scans; None: always.
+    """(num_sensors, num_scans or more) whether each sensor scans in a run, without lost scans. None: always.
 
     scans_at, scan_loss_probability: see `Experiment`. Each sensor loses scans by random numbers of its own. Its other
     scans are therefore those of a run without losses, except for the numbers drawn meanwhile.
@@ -52,7 +52,7 @@ def scan_flags_of_run(
 
 
 class RunningTracker:
-    """A tracker with its state during a run; a filter that needs the true targets receives them."""
+    """A tracker with its state during a run. A filter that needs the true targets receives them."""
 
     def __init__(
         self, tracker: Tracker, estimate: Estimator, truth: Truth, rngs: Sequence[np.random.Generator]
@@ -63,7 +63,7 @@ class RunningTracker:
     def step(
         self, step: int, scans: Sequence[Any], poses: Floats, time: float, clock: StageTimer
     ) -> tuple[State, TrackerInfo, Estimate]:
-        """Process the scans of a step; return the new state, the tracker's report and the estimate."""
+        """Process the scans of a step, and return the new state, the tracker's report and the estimate."""
         with clock.timing("filter"):
             state, info = self._tracker.step(self._state, scans, poses, time, rngs=self._rngs)
         with clock.timing("estimate"):
@@ -94,18 +94,18 @@ class SimulationRun:
         seed, run: determine every random number: the targets and scans equal those of that run of a campaign.
         truth: the targets at all scans, for scoring.
         fleet: the sensor platforms and their motion.
-        outcome: result of the last scan; None before the first.
+        outcome: result of the last scan, or None before the first.
     """
 
     def __init__(
         self, experiment: Experiment, *, seed: int, run: int = 0, moving: bool = True, truth: Truth | None = None
     ) -> None:
-        """Start before the first scan; to repeat a run, create another object.
+        """Start before the first scan. To repeat a run, create another object.
 
         Args:
             experiment, seed, run: as above.
             moving: whether the sensors move at all.
-            truth: the targets, if known already (`truth_of_run`); None: they are drawn.
+            truth: the targets, if known already (`truth_of_run`). None: they are drawn.
 
         Raises `VedetteError` if the true targets cannot be drawn.
         """
@@ -126,7 +126,7 @@ class SimulationRun:
         return self.outcome is not None and self.outcome.step == len(self.experiment.times)
 
     def follow(self, actions: Sequence[Floats | None]) -> None:
-        """Start actions of the sensors at their present poses, one row of `Platform.actions` each; None: stay.
+        """Start actions of the sensors at their present poses, one row of `Platform.actions` each. None: stay.
 
         Raises `InputError` for invalid actions, or before the first scan.
         """
@@ -138,7 +138,7 @@ class SimulationRun:
         """Simulate one scan of every sensor, process it in the tracker, and estimate the targets.
 
         Args:
-            actions: actions to start first, see `follow`; None: the sensors continue as they are.
+            actions: actions to start first, see `follow`. None: the sensors continue as they are.
             stages: stage timer for "scans", "filter" and "estimate".
 
         Raises:
@@ -198,9 +198,9 @@ def simulate(
 
     Args:
         experiment: the parts of the run.
-        planner: decides at the experiment's decision steps; None: the sensors never move, and no decision is made.
-        seed, run: determine every random number; runs with equal seed and number are paired across planners.
-        score: (num_scans, 3) OSPA of the estimates against the truth, see `vedette.evaluation.ospa_of_run`; None: NaN.
+        planner: decides at the experiment's decision steps. None: the sensors never move, and no decision is made.
+        seed, run: determine every random number. Runs with equal seed and number are paired across planners.
+        score: (num_scans, 3) OSPA of the estimates against the truth, see `vedette.evaluation.ospa_of_run`. None: NaN.
         progress: called with the number of every finished scan.
 
     Raises:

@@ -37,9 +37,9 @@ class Schedule(NamedTuple):
     """Schedule of scans and decisions, and the fusion weights.
 
     times: (num_scans,) s. decision_steps: scans, from 1, followed by a decision. powers: weight of each sensor in the
-    fused density. one_belief: whether all scans update one density, which sensors share after every scan; otherwise
+    fused density. one_belief: whether all scans update one density, which sensors share after every scan. Otherwise
     each has its own. rebirths: whether a lost target can be found again. scans_at: (num_sensors, num_scans or more)
-    whether each sensor scans; None: always.
+    whether each sensor scans. None: always.
     """
 
     times: Floats
@@ -64,7 +64,7 @@ class OraclePlanner:
 
     It starts from the filters' covariances of the targets that they track, and propagates them through all scans
     (`vedette.simulation.cramer_rao.CovarianceRecursion`). Scans may miss targets and filters may err, so the result
-    does not bound a single run; for localisation it is the lower bound of what control can reach. Targets that appear
+    does not bound a single run. For localisation it is the lower bound of what control can reach. Targets that appear
     later are not foreseen. State components of the motion model that recorded targets lack, such as a turn rate, are
     taken as 0.
 
@@ -78,7 +78,7 @@ class OraclePlanner:
         search: search over joint actions.
         constraints: constraints of the sensors, tested at the present decision only.
         estimate: extracts the tracks from a density.
-        truth: the targets; None: set by `with_truth`.
+        truth: the targets. None: set by `with_truth`.
 
     Raises:
         InputError: parts of another type, or targets with more components than the motion's states.
@@ -115,7 +115,7 @@ class OraclePlanner:
         return replace(self, truth=truth)
 
     def plan(self, state: State, poses: Floats, *, rng: np.random.Generator) -> Plan:
-        """Return the joint action of least cost; `rng` is for the search. Raises `InputError` for invalid inputs."""
+        """Return the joint action of least cost. `rng` is for the search. Raises `InputError` for invalid inputs."""
         generator(rng)
         instance("state", state, State)
         if self.truth is None:

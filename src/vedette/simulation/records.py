@@ -29,7 +29,7 @@ class Decision(SummaryRepr):
         time: time of that scan, s.
         poses: (num_sensors, 3 or more) poses [px, py, heading_rad, ...] of the sensors at that scan.
         plan: the chosen actions and their rewards.
-        undetected: intensity of undetected targets, for search planners; None: not known, or not stored.
+        undetected: intensity of undetected targets, for search planners. None: not known, or not stored.
     """
 
     step: int
@@ -64,7 +64,7 @@ class RunSummary:
     """Part of a record that comparisons and reports use: no targets or tracks.
 
     Attributes:
-        scenario, seed, run, times, decisions, ospa, health, timings: as in the record; decisions without explanations.
+        scenario, seed, run, times, decisions, ospa, health, timings: as in the record, without explanations.
         num_targets: (num_scans,) number of true targets.
     """
 
@@ -93,7 +93,7 @@ class RunRecord(TabularRepr):
     Attributes:
         scenario: name of the scenario.
         planner: name of the strategy.
-        seed: seed of the campaign; with `run` it determines every random number; for recorded scans only those of
+        seed: seed of the campaign. With `run` it determines every random number, for recorded scans only those of
             filters that draw.
         run: index of the run within the campaign.
         times: (num_scans,) s.
@@ -102,12 +102,12 @@ class RunRecord(TabularRepr):
         off: (num_scans, num_sensors) whether the action of a sensor switched it off.
         estimates: one per scan.
         decisions: in order of time.
-        ospa: (num_scans, 3) total, localisation and cardinality parts, m; without unit if whole states are compared.
+        ospa: (num_scans, 3) total, localisation and cardinality parts, m, without unit if whole states are compared.
         health: reports of the filters and the fusion.
         timings: for each stage (`scans`, `filter`, `fusion`, `estimate`, `planning`), (num_scans,) wall time at each
-            scan, s; the only content that the seed does not determine.
-        stopped: where and why the run ended before its last scan; None: it did not.
-        recording: file of recorded scans; None: the scans were simulated.
+            scan, s, the only content that the seed does not determine.
+        stopped: where and why the run ended before its last scan. None: it did not.
+        recording: file of recorded scans. None: the scans were simulated.
     """
 
     scenario: str
@@ -147,7 +147,7 @@ class RunRecord(TabularRepr):
         return RunSummary(*identity, self.ospa, np.diff(self.truth.offsets), self.health, self.timings)
 
     def scan_columns(self) -> Columns:
-        """Return the table `scans` of a saved run, one row per scan; see docs/results.md."""
+        """Return the table `scans` of a saved run, one row per scan. See docs/results.md."""
         return {
             "step": np.arange(1, self.num_scans + 1),
             "time_s": self.times,
@@ -200,5 +200,5 @@ class Measure(Protocol):
     """Metric of a run."""
 
     def __call__(self, record: RunRecord) -> Any:
-        """(num_scans,) numbers; NaN where undefined."""
+        """(num_scans,) numbers, NaN where undefined."""
         ...

@@ -73,7 +73,7 @@ class OracleFilter(_Reference):
 
     Attributes:
         targets, sensors: as in the other reference filter.
-        truth: the targets of the run; None: set by `with_truth`.
+        truth: the targets of the run. None: set by `with_truth`.
     """
 
     truth: Truth | None = None

@@ -23,7 +23,7 @@ def scans_of(record: RunRecord, experiment: Experiment) -> tuple[tuple[Scan | No
         experiment: gives the true sensors, and the steps at which they scan.
 
     Returns:
-        For each scan one `Scan` per sensor, or None if it did not scan; its origins are ids of `record.truth`, or
+        For each scan one `Scan` per sensor, or None if it did not scan. Its origins are ids of `record.truth`, or
         `CLUTTER`.
 
     Raises:

@@ -28,7 +28,7 @@ class Scan(SummaryRepr):
 
     Attributes:
         measurements: (num_measurements, meas_dim) the input of the filters.
-        origins: (num_measurements,) id of the target behind each measurement, or `CLUTTER`; for evaluation only.
+        origins: (num_measurements,) id of the target behind each measurement, or `CLUTTER`, for evaluation only.
     """
 
     measurements: Floats
@@ -52,7 +52,7 @@ def simulate_scan(
         truth_states: (num_targets, state_dim).
         pose: (3 or more,) px, py, heading_rad, ... of the sensor.
         sensor: the sensor model of the filter, or a true sensor that differs from it.
-        ids: (num_targets,) ids for `Scan.origins`; None: the row in `truth_states`.
+        ids: (num_targets,) ids for `Scan.origins`. None: the row in `truth_states`.
         rng: generator of all random numbers.
 
     Raises:
@@ -64,7 +64,7 @@ def simulate_scan(
 
 
 def _named(ids: ArrayLike | None, num: int) -> Ints:
-    """(num,) ids of the targets; None: their row numbers."""
+    """(num,) ids of the targets. None: their row numbers."""
     names = np.arange(num) if ids is None else np.array(ids)
     if names.shape != (num,):
         raise reject("ids", f"{num} ids, one a target", names.tolist())
@@ -120,9 +120,9 @@ def simulate_scans(
     ids: ArrayLike | None = None,
     rngs: Sequence[np.random.Generator],
 ) -> tuple[Scan | None, ...]:
-    """Return one scan per sensor, each with its own pose and random numbers; see `simulate_scan`.
+    """Return one scan per sensor, each with its own pose and random numbers. See `simulate_scan`.
 
-    A sensor that is None does not scan and draws nothing; its entry is None.
+    A sensor that is None does not scan and draws nothing. Its entry is None.
     """
     states, stages, scans = float_array("truth_states", truth_states, (None, None)), StageTimer(), list[Scan | None]()
     names = _named(ids, len(states))

@@ -46,7 +46,7 @@ def encode_run(record: RunRecord) -> dict[str, bytes]:
 def decode_run(
     facts: Mapping[str, Any], files: Mapping[str, bytes], place: str, timings: bytes | None = None
 ) -> RunRecord:
-    """Return the record from its files; without `timings` (from `encode_timings`) it has none.
+    """Return the record from its files. Without `timings` (from `encode_timings`) it has none.
 
     Raises `InputError`, naming `place` and the file, for files that are missing, damaged or inconsistent.
     """
@@ -60,7 +60,7 @@ def decode_run(
 def decode_summary(
     facts: Mapping[str, Any], files: Mapping[str, bytes], place: str, timings: bytes | None = None
 ) -> RunSummary:
-    """Return the summary of a run from its files, in a third of the time of `decode_run`; raises as `decode_run`.
+    """Return the summary of a run from its files, in a third of the time of `decode_run`. Raises as `decode_run`.
 
     Tables of targets and tracks are not read.
     """

@@ -48,11 +48,11 @@ def save_run(
 
     Args:
         record: the run.
-        directory: the folder to make; missing parents are made too.
+        directory: the folder to make. Missing parents are made too.
         scenario_text: text of the scenario, stored with the results.
         fit: of the model to recorded scans (`vedette.evaluation.fit.Fit.to_dict`), kept in the manifest.
-        overwrite: replace a folder that holds a run; a folder that holds anything else is never replaced.
-        unfinished: mark the folder with a file `UNFINISHED`, to be deleted when its other files are written too; until
+        overwrite: replace a folder that holds a run. A folder that holds anything else is never replaced.
+        unfinished: mark the folder with a file `UNFINISHED`, to be deleted when its other files are written too. Until
             then it may be replaced without `overwrite`.
 
     Returns the folder. Raises `InputError` if it exists already, cannot be written, or the record contradicts itself.
@@ -108,7 +108,7 @@ def read_files(folder: Path, manifest: Mapping[str, Any]) -> dict[str, bytes]:
 
 
 def check_version(manifest: Mapping[str, Any], session: Any, place: Path) -> None:
-    """Raise `InputError` unless a saved run or a campaign has this format; the message says what to do with another."""
+    """Raise `InputError` unless a saved run or a campaign has this format. The message says what to do with another."""
     number = manifest.get("format_version")
     if type(number) is int and number == FORMAT_VERSION:
         return
@@ -187,7 +187,7 @@ def _read(path: Path) -> bytes:
 
 
 def check_target(target: Path, overwrite: bool) -> tuple[int, ...]:
-    """Return the identity of the run that a folder holds, () if none; raise `InputError` unless one may be saved there.
+    """Return the identity of the run that a folder holds, () if none. Raise `InputError` unless one may be saved there.
 
     The place must be new, empty, or a run that is unfinished or may be overwritten, and its parent folder must be
     writable.
@@ -208,7 +208,7 @@ def check_target(target: Path, overwrite: bool) -> tuple[int, ...]:
 
 
 def unchanged_target(target: Path, overwrite: bool, identity: tuple[int, ...]) -> Path:
-    """Return the folder if it is as it was when `check_target` returned `identity`; else a new one of a similar name.
+    """Return the folder if it is as it was when `check_target` returned `identity`, else a new one of a similar name.
 
     This keeps what another process has written there in the meantime.
     """

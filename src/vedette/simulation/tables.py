@@ -2,7 +2,7 @@
 
 `step` counts scans from 1 in every table. A row of `tracks` is one estimate at one scan, a row of `actions` one
 available action of a sensor at a decision, and a row of `rewards` one evaluated combination, with `action_0` the action
-of the first sensor; for many sensors, rewards of a single sensor's actions are in a table of their own. See
+of the first sensor. For many sensors, rewards of a single sensor's actions are in a table of their own. See
 `decision_tables` for decisions and `explanation_tables` for their explanations.
 """
 
@@ -135,7 +135,7 @@ def summary_of(
 
     Raises as `record_of`.
 
-    The numbers of targets are those in the table `scans`; they are not checked against the table of targets.
+    The numbers of targets are those in the table `scans`. They are not checked against the table of targets.
     """
     scans, sensors, num_scans = tables["scans"], tables["sensors"], len(tables["scans"]["step"])
     poses = _poses_of(tables)

@@ -19,15 +19,15 @@ class TrueSensor:
 
     Attributes:
         model: measurements, noise, detection and clutter.
-        first_detection: detection at its first scan only; None: as at the others.
+        first_detection: detection at its first scan only. None: as at the others.
         detection_of: state at which the detection probability is evaluated: the target's true "state", or with the
-            position that the "measurement" gives (`MeasurementModel.places`), noise included; the rest of the state
+            position that the "measurement" gives (`MeasurementModel.places`), noise included. The rest of the state
             stays.
         bias: bias of its scans, measured minus true. With a positive clock bias, measurements are of slightly earlier
             positions, by the targets' velocities.
 
     Raises:
-        InputError: a part of another type; detection of the measurement if that gives no position; a bias in a
+        InputError: a part of another type, detection of the measurement if that gives no position, or a bias in a
             component that is not measured.
     """
 
@@ -81,11 +81,11 @@ def true_sensors_of(given: Sequence[TrueSensor], known: Sequence[SensorModel]) -
 
 
 def sensors_at_step(sensors: Sequence[TrueSensor], scans_at: Bools | None, step: int) -> tuple[TrueSensor | None, ...]:
-    """Return the true sensors at a step; None for one that does not scan then.
+    """Return the true sensors at a step, or None for one that does not scan then.
 
     Args:
         sensors: all sensors.
-        scans_at: (num_sensors, num_scans) whether each scans; None: at every step.
+        scans_at: (num_sensors, num_scans) whether each scans. None: at every step.
         step: step of the run, from 1.
     """
     if scans_at is None:

@@ -44,7 +44,7 @@ class TrueTargetsPlanner:
         sensors: the sensors that it controls.
         cutoff: error that counts as a lost target, m.
         estimate: extracts the tracks from a density.
-        truth: the targets; None: set by `with_truth`.
+        truth: the targets. None: set by `with_truth`.
 
     Raises:
         InputError: parts of another type, or targets with more components than the motion's states.
@@ -69,7 +69,7 @@ class TrueTargetsPlanner:
         return replace(self, truth=truth)
 
     def plan(self, state: State, poses: Floats, *, rng: np.random.Generator) -> Plan:
-        """Return the decision on the true targets; raises as the planner, and `InputError` without a truth."""
+        """Return the decision on the true targets. Raises as the planner, and `InputError` without a truth."""
         instance("state", state, State)
         if self.truth is None:
             raise InputError("truth: expected the targets of the run, as of with_truth(); got None")
@@ -120,7 +120,7 @@ def match_tracks(estimate: Estimator, belief: Any, step: int, states: Floats, cu
 
 
 def with_components(truth: Truth, dim: int) -> Truth:
-    """Return the targets with states of `dim` components; missing ones are 0."""
+    """Return the targets with states of `dim` components. Missing ones are 0."""
     missing = dim - truth.states.shape[1]
     if missing < 0:
         raise reject("truth", f"states of at most {dim} components, as the motion's", truth.states.shape[1])

@@ -28,8 +28,8 @@ class Truth(SummaryRepr):
     Attributes:
         times: (num_scans,) s, increasing.
         offsets: (num_scans + 1,) targets of scan `k` are the rows `offsets[k]:offsets[k + 1]`.
-        ids: (total,) id of the target, at least 0; at most once per scan.
-        states: (total, state_dim) state of the target; position first.
+        ids: (total,) id of the target, at least 0, at most once per scan.
+        states: (total, state_dim) state of the target, position first.
     """
 
     times: Floats
@@ -114,11 +114,11 @@ class ScriptedTargets:
     Attributes:
         motion: motion model.
         initial_states: (num_targets, state_dim) state of each at its start time.
-        start_times: (num_targets,) s; None: the first scan.
-        end_times: (num_targets,) last time of each, included, s; infinite or None: to the end.
-        process_noise: whether the motion's process noise is applied; one flag, or one per target.
+        start_times: (num_targets,) s. None: the first scan.
+        end_times: (num_targets,) last time of each, included, s. Infinite or None: to the end.
+        process_noise: whether the motion's process noise is applied, one flag, or one per target.
         initial_stds: (num_targets, state_dim) standard deviations of the initial states, which each run draws anew
-            around `initial_states`, components independent; None: all zero.
+            around `initial_states`, components independent. None: all zero.
 
     Raises:
         InputError: names the field, the expected and the given value.
@@ -187,7 +187,7 @@ class ScriptedTargets:
 
 
 def _elapsed(scans: Floats, starts: Floats, alive: Bools) -> Floats:
-    """(num_targets, num_scans) time by which a target moves before a scan, s; 0 if it does not.
+    """(num_targets, num_scans) time by which a target moves before a scan, s, or 0 if it does not.
 
     It is the time since its previous scan or its start.
     """
@@ -200,7 +200,7 @@ def _elapsed(scans: Floats, starts: Floats, alive: Bools) -> Floats:
 
 
 def moved_states(motion: MotionModel, states: Floats, dt: float, normals: Floats, noisy: Bools) -> Floats:
-    """(num, state_dim) states `dt` seconds later, with process noise where `noisy`; raises `ModelError`.
+    """(num, state_dim) states `dt` seconds later, with process noise where `noisy`. Raises `ModelError`.
 
     normals: (num, state_dim) standard normal deviates, read where `noisy`.
     """

@@ -19,7 +19,7 @@ class UniformTargets:
 
     From scan to scan a target dies or moves with the motion's process noise. The number of births is Poisson with the
     mean number of deaths. A target that leaves the region is replaced by one that enters at the opposite edge with the
-    same velocity; otherwise the density would decrease towards the edges, the more the smaller the region.
+    same velocity. Otherwise the density would decrease towards the edges, the more the smaller the region.
 
     Attributes:
         motion: motion model.
@@ -79,7 +79,7 @@ class UniformTargets:
         return np.hstack([self.region.sample(num, rng=rng), self.std * rng.standard_normal((num, len(self.std)))])
 
     def _moved(self, states: Floats, dt: float, rng: np.random.Generator) -> tuple[Floats, Bools]:
-        """(num, state_dim) states `dt` seconds later, wrapped at the edges; (num,) whether a target crossed no edge."""
+        """(num, state_dim) states `dt` seconds later, wrapped at edges, and (num,) whether a target crossed none."""
         moved = self.motion.propagate(states, dt) + self._noise(states, dt, rng)
         check_moved(states, moved, dt)
         stays = self.region.contains(moved[:, :2])

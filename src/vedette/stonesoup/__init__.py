@@ -1,4 +1,4 @@
-"""A Stone Soup tracker and sensor manager based on Vedette; converts Stone Soup models, scans and truth."""
+"""A Stone Soup tracker and sensor manager based on Vedette. It converts Stone Soup models, scans and truth."""
 
 from vedette.internal.extras import require_packages
 

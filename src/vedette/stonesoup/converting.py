@@ -60,11 +60,11 @@ class ConvertedModels:
     def tracker(
         self, kind: Literal["lmb", "glmb"] = "lmb", *, fusion: Fusion | None = None, feedback: bool = False
     ) -> Tracker:
-        """Return a Vedette tracker: the filter of one sensor; for several, one filter of all scans, or a fusion.
+        """Return a Vedette tracker: the filter of one sensor, or for several, one filter of all scans, or a fusion.
 
         Args:
             kind: kind of filter.
-            fusion: fusion of a filter at each sensor; None: one filter takes all scans (decision 8).
+            fusion: fusion of a filter at each sensor. None: one filter takes all scans (decision 8).
             feedback: whether sensors take over the fused belief, see `vedette.tracking.Distributed`.
         """
         one_of("kind", kind, _FILTERS)
@@ -97,19 +97,19 @@ def convert(
 
     Args:
         transition_model: see `convert_motion`.
-        sensors: sensors or measurement models (see `convert_measurement`), one or more; several by the names in their
+        sensors: sensors or measurement models (see `convert_measurement`), one or more. Several by the names in their
             detections' `metadata["sensor"]`, or in a list, for names "0", "1", ...
         births: where targets appear. A `GaussianState`, as the prior of a `SimpleMeasurementInitiator`: at every
             measurement that no track explains, with its variances. A list of `WeightedGaussianState`: at these
             positions, each with its weight as the probability of a birth at a scan. Or a `BirthModel` or
             `MeasurementBirth` of `vedette.models`.
-        clutter: see `convert_clutter`; None: the `clutter_model` of each sensor.
+        clutter: see `convert_clutter`. None: the `clutter_model` of each sensor.
         prob_detection: probability in a sensor's field of view (`convert_detection`), or a detection model.
         prob_survival: probability of survival to the next scan.
         expected_births, max_existence: for births from measurements, see `vedette.models.MeasurementBirth`.
 
     Raises:
-        InputError: a model without an equal in Vedette; the message names the model, the field and the value.
+        InputError: a model without an equal in Vedette. The message names the model, the field and the value.
     """
     try:
         named = dict(sensors) if isinstance(sensors, Mapping) else {str(k): own for k, own in enumerate(sensors)}

@@ -88,7 +88,7 @@ class PlanningSensorManager(SensorManager):  # type: ignore[misc] # Stone Soup i
 
     The sensors are those that `models` were converted from, on the ground or on platforms, each of which carries one.
     They are controlled by the `dwell_centre` of a rotating radar and by the movement of a platform. Tracks become a
-    labelled multi-Bernoulli, with `metadata["existence"]` as existence probability; tracks of an earlier time are
+    labelled multi-Bernoulli, with `metadata["existence"]` as existence probability. Tracks of an earlier time are
     predicted.
     """
 
@@ -125,7 +125,7 @@ class PlanningSensorManager(SensorManager):  # type: ignore[misc] # Stone Soup i
     def choose_actions(
         self, tracks: Any, timestamp: datetime.datetime, nchoose: int = 1, return_reward: bool = False, **kwargs: Any
     ) -> Any:
-        """Return the actions until `timestamp`, in the form of other sensor managers; `plan` has the plan behind them.
+        """Return the actions until `timestamp`, in the form of other sensor managers. `plan` has the plan behind them.
 
         Returns:
             A list of one dictionary, with the actions of each sensor, and platform. With `return_reward` also an array

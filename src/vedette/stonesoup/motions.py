@@ -1,6 +1,6 @@
 """Conversion of Stone Soup's transition models into motion models, and the layout of its states.
 
-Its noise is that of an acceleration that is white in continuous time; its coefficients are spectral densities.
+Its noise is that of an acceleration that is white in continuous time. Its coefficients are spectral densities.
 """
 
 from __future__ import annotations
@@ -177,7 +177,7 @@ def convert_motion(transition_model: Any) -> tuple[MotionModel, StateLayout]:
     `ConstantNthDerivative`, whose densities may differ; `ConstantTurn`; `KnownTurnRate`.
 
     Raises:
-        InputError: another model; the message names the model, the field and the value.
+        InputError: another model. The message names the model, the field and the value.
     """
     if type(transition_model) not in _MOTIONS:
         wanted = f"one of {', '.join(kind.__name__ for kind in _MOTIONS)}"

@@ -31,15 +31,15 @@ class Scans(NamedTuple):
 class ScanConverter:
     """Converts times with sets of detections into scans, one after the other.
 
-    A detection belongs to the sensor in its `metadata["sensor"]`; without one, to the sensor with its current
-    measurement model. The pose is that of the detection's measurement model; for an empty scan that of the sensor
+    A detection belongs to the sensor in its `metadata["sensor"]`, or without one, to the sensor with its current
+    measurement model. The pose is that of the detection's measurement model, or for an empty scan that of the sensor
     itself.
 
     Attributes:
         models: of the sensors.
-        every_sensor_scans: whether all sensors scan at each time, those without detections with an empty scan; False:
+        every_sensor_scans: whether all sensors scan at each time, those without detections with an empty scan. False:
             only sensors with detections scan, and an empty set belongs to no sensor.
-        start: the time of 0 s; None: the first time.
+        start: the time of 0 s. None: the first time.
     """
 
     models: ConvertedModels
@@ -51,7 +51,7 @@ class ScanConverter:
         """Return the scans of one time.
 
         Raises:
-            InputError: an invalid detection; the message names the detection and its attribute, what was expected and
+            InputError: an invalid detection. The message names the detection and its attribute, what was expected and
                 the value.
         """
         if self.start is None:
@@ -112,13 +112,13 @@ def convert_truth(
     *,
     start: datetime.datetime | None = None,
 ) -> Truth:
-    """Convert ground truth paths of Stone Soup into the truth of a run; a path exists at the times of its states.
+    """Convert ground truth paths of Stone Soup into the truth of a run. A path exists at the times of its states.
 
     Args:
         paths: `GroundTruthPath`s, or anything that iterates over states with a `timestamp` and a `state_vector`.
         times: of the scans, increasing.
         layout: of the states.
-        start: the time of 0 s; None: the first.
+        start: the time of 0 s. None: the first.
     """
     moments = list(times)
     start = moments[0] if start is None and moments else start

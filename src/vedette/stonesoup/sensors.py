@@ -72,7 +72,7 @@ def measured_quantities(model: Any) -> tuple[str, ...]:
 
 
 def convert_measurement(model: Any, layout: StateLayout) -> MeasurementModel:
-    """Convert a Stone Soup measurement model; bearings are rotated by its `rotation_offset`.
+    """Convert a Stone Soup measurement model. Bearings are rotated by its `rotation_offset`.
 
     `LinearGaussian` of the position, `CartesianToBearingRange` and `Cartesian2DToBearing`.
 
@@ -87,7 +87,7 @@ def convert_measurement(model: Any, layout: StateLayout) -> MeasurementModel:
 
 
 def convert_pose(model: Any) -> Floats:
-    """Return [px, py, heading_rad] of the sensor of a measurement model; zeros if it has no position.
+    """Return [px, py, heading_rad] of the sensor of a measurement model, or zeros if it has no position.
 
     Raises:
         InputError: a sensor that is rotated about the x or the y axis.
@@ -129,7 +129,7 @@ def convert_detection(sensor: Any, prob_detection: float) -> DetectionModel:
 
     For a measurement model, everywhere.
 
-    Stone Soup's radars detect every target in their field of view; the probability corrects this.
+    Stone Soup's radars detect every target in their field of view. The probability corrects this.
 
     Raises:
         InputError: a sensor with an unsupported field of view, or with obstacles.

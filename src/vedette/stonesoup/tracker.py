@@ -34,12 +34,12 @@ class LabelledTracker(_TrackerMixInUpdate, Tracker):  # type: ignore[misc] # Sto
     """Stone Soup tracker whose tracks are the labels of an LMB or GLMB filter of one or several sensors.
 
     A label has a track from the time its existence exceeds `existence_threshold` until it no longer exceeds
-    `end_threshold`, with a state at every time; it then also has the earlier states since it exceeded `end_threshold`,
+    `end_threshold`, with a state at every time. It then also has the earlier states since it exceeded `end_threshold`,
     like tracks of Stone Soup's initiators. Its `id` is the label ("birth step.index"), if it returns "birth step.index
     (2)", and `metadata["existence"]` the probability. The state is a `GaussianStateUpdate`. As a filter averages over
     associations, its hypothesis names the detection that is nearest to the updated state in standard deviations of the
-    sensor's noise, over all sensors; a `MissedDetection` if none is near. The prediction in it is the predicted last
-    state of the track; a new track has none.
+    sensor's noise, over all sensors, or a `MissedDetection` if none is near. The prediction in it is the predicted last
+    state of the track. A new track has none.
     """
 
     detector: Any = Property(doc="Yields times and sets of detections: a detector, reader, simulator or list.")
@@ -87,7 +87,7 @@ class LabelledTracker(_TrackerMixInUpdate, Tracker):  # type: ignore[misc] # Sto
         return {track for label, track in self._current.items() if label in self._confirmed}
 
     def update_tracker(self, time: datetime.datetime, detections: Any) -> tuple[datetime.datetime, set[Track]]:
-        """Update with the detections of a time; return the time and the tracks."""
+        """Update with the detections of a time, and return the time and the tracks."""
         given = self._scans.at(time, detections)
         self.state, self.info = self.tracker.step(self.state, given.scans, given.poses, given.time, rngs=self._rngs)
         before, self._current = self._current, {}

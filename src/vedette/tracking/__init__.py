@@ -1,4 +1,4 @@
-"""Trackers of all sensors: local filters with fusion, one central filter, or a radio network; late scans; snapshots."""
+"""Trackers of all sensors: local filters with fusion, a central filter, a radio network. Late scans and snapshots."""
 
 from vedette.tracking.base import StageTimer, State, Tracker, TrackerInfo, failed_stage
 from vedette.tracking.belief_network import BeliefNetwork

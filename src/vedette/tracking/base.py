@@ -34,12 +34,12 @@ class State(SummaryRepr):
     Attributes:
         local: belief of each sensor.
         fused: fused belief of all sensors.
-        step: number of the scan, from 1; 0 before the first.
-        time: time of that scan in s; None before the first.
-        memory: data of the tracker itself for the next step, such as birth candidates; None if it needs none.
+        step: number of the scan, from 1, or 0 before the first.
+        time: time of that scan in s, or None before the first.
+        memory: data of the tracker itself for the next step, such as birth candidates, or None if it needs none.
         undetected: intensity of undetected targets, if `BirthModel.anywhere` has cells for those of the belief, or the
-            tracker maintains it (`UndetectedTargetTracker`); else None.
-        unseen: seconds since a scan had each label in view, if the tracker maintains them (`ViewTracker`); else None.
+            tracker maintains it (`UndetectedTargetTracker`), else None.
+        unseen: seconds since a scan had each label in view, if the tracker maintains them (`ViewTracker`), else None.
     """
 
     local: tuple[Any, ...]
@@ -69,9 +69,9 @@ class TrackerInfo(SummaryRepr):
 
     Attributes:
         filters: reports of the filters: one per sensor, or a single one for all sensors together.
-        fusion: report of the fusion; None without fusion.
-        seconds: wall time by stage; the record of a run contains "filter" and "fusion".
-        bytes_sent: bytes that each sensor sent; empty if the tracker sends nothing or does not count them.
+        fusion: report of the fusion, or None without fusion.
+        seconds: wall time by stage. The record of a run contains "filter" and "fusion".
+        bytes_sent: bytes that each sensor sent, empty if the tracker sends nothing or does not count them.
     """
 
     filters: tuple[FilterInfo, ...]
@@ -105,18 +105,18 @@ class Tracker(Protocol):
 
         Args:
             state: state that the previous step returned.
-            scans: one per sensor: (num, meas_dim) measurements, in any order; angles in radians. Empty for a scan
-                without detections; None for a sensor that did not scan at `time`.
+            scans: one per sensor: (num, meas_dim) measurements, in any order, with angles in radians. Empty for a scan
+                without detections. None for a sensor that did not scan at `time`.
             poses: (num_sensors, 3 or more) [px, py, heading_rad, ...] of each sensor at `time`.
             time: time in s, at least `state.time`. Equal for further scans of the same time: no motion, deaths or
-                births in between. Networks exchange messages at each such step; their delays count times.
+                births in between. Networks exchange messages at each such step. Their delays count times.
             rngs: one per sensor, for filters that draw random numbers.
 
         Returns:
             The state after these scans, and a report.
 
         Raises:
-            InputError: a number of scans, poses or generators that differs from the number of sensors; a time before
+            InputError: a number of scans, poses or generators that differs from the number of sensors, or a time before
                 the last.
             ModelError, NumericalError: from the filters and the fusion. Every exception has a note with the stage that
                 raised it (`vedette.tracking.failed_stage`).
@@ -178,7 +178,7 @@ def check_step(
 
 
 class StageTimer:
-    """Stopwatch for the stages of a step; it also adds a note with the stage to an exception raised inside.
+    """Stopwatch for the stages of a step. It also adds a note with the stage to an exception raised inside.
 
     Attributes:
         seconds: wall time by stage, in order of their first start.
@@ -202,18 +202,18 @@ class StageTimer:
 
 
 def failed_stage(error: BaseException) -> str | None:
-    """Return the stage that raised an exception, such as "the filter of sensor 2"; None without a note of it."""
+    """Return the stage that raised an exception, such as "the filter of sensor 2", or None without a note of it."""
     notes = [note for note in getattr(error, "__notes__", ()) if note.startswith(_NOTE_PREFIX)]
     return notes[0].removeprefix(_NOTE_PREFIX) if notes else None
 
 
 def scan_bytes(scan: Any, pose: Any) -> int:
-    """Return the bytes of the measurements and of the sensor's pose; 0 without a scan."""
+    """Return the bytes of the measurements and of the sensor's pose, or 0 without a scan."""
     return 0 if scan is None else NUMBER_BYTES * (np.size(scan) + len(pose))
 
 
 def belief_bytes(belief: Any) -> int:
-    """Return the bytes of labels, existences or hypotheses, and track components; 0 for a density without labels."""
+    """Return the bytes of labels, existences or hypotheses, and track components, or 0 for a density without labels."""
     if not isinstance(belief, LabelledDensity):
         return 0
     tracks = belief.tracks

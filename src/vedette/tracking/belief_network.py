@@ -45,7 +45,7 @@ class _Memory(NamedTuple):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class BeliefNetwork(LocalFilters):
-    """Tracker with a filter at each sensor; each sensor replaces its belief by the fusion of the beliefs it received.
+    """Tracker with a filter at each sensor. Each sensor replaces its belief by the fusion of the beliefs it received.
 
     A sensor fuses the newest belief that it has received from each other sensor, predicted to the time of its own. If
     the fusion divides by the common prediction and the sensors' predictions differ (for example if two groups have met
@@ -53,16 +53,16 @@ class BeliefNetwork(LocalFilters):
     added to the merged prediction.
 
     Consensus: after L rounds of averaging with Metropolis weights W, a sensor has the average of all sensors' inputs
-    with the weights in its row of W^L; it is computed as that average. For sums, as in `ParallelUpdate`, the average is
+    with the weights in its row of W^L. It is computed as that average. For sums, as in `ParallelUpdate`, the average is
     multiplied by the number of sensors in the group. As L grows, both converge to the result of all sensors together.
 
     Attributes:
-        filters: one per sensor; all have the same target model.
+        filters: one per sensor. All have the same target model.
         targets, sensors: as in `Tracker`.
-        fusion: fusion of the received beliefs; its weights are replaced by equal ones, or by those of the consensus.
+        fusion: fusion of the received beliefs. Its weights are replaced by equal ones, or by those of the consensus.
         network: radio network between the sensors.
         merging: fusion of predictions with different histories, and of the sensors' beliefs into the one that is
-            reported if they differ; its weights are replaced in the same way.
+            reported if they differ. Its weights are replaced in the same way.
 
     Raises:
         InputError: filters as in `Distributed`; a fusion without weights; a fusion that divides by the common
@@ -91,7 +91,7 @@ class BeliefNetwork(LocalFilters):
     def step(
         self, state: State, scans: Sequence[Any], poses: Any, time: float, *, rngs: Sequence[np.random.Generator]
     ) -> tuple[State, TrackerInfo]:
-        """Filter each sensor's scan, send the beliefs and fuse those that have arrived; see `Tracker.step`."""
+        """Filter each sensor's scan, send the beliefs and fuse those that have arrived. See `Tracker.step`."""
         pose_array, dt = check_step(state, scans, poses, time, rngs, self, len(self.filters))
         if dt == 0.0 and self.network.delay > 0:
             expected = f"one after that of the last scan, {time:g} s, as beliefs that are late would count again"
@@ -141,7 +141,7 @@ class BeliefNetwork(LocalFilters):
         return tuple(predictions), beliefs, infos
 
     def _fuse_received(self, pending: Sequence[_SentMessages], hops: Ints) -> tuple[list[Any], list[FusionInfo | None]]:
-        """Return each sensor's fused belief and report; sensors that fused the same messages share one object."""
+        """Return each sensor's fused belief and report. Sensors that fused the same messages share one object."""
         now, num = pending[-1], len(self.filters)
         shares = self._weights(hops)
         cache: dict[tuple[Any, ...], tuple[Any, FusionInfo | None]] = {}

@@ -25,12 +25,12 @@ def with_velocities(births: LMB, std: Floats, sensors: Sequence[SensorModel], sc
     For each birth and sensor, the nearest measurement is attributed to the birth if it lies within `std` along each
     axis. At its position a component z_c is linear in the velocity v: with h(x) and its slope H at rest, the prior
     N(v; m, P) becomes the posterior of z_c = h_c + H v + noise. Along the line of sight the uncertainty becomes that of
-    a range rate; across it the prior remains.
+    a range rate. Across it the prior remains.
 
     Args:
         births: births of one component each, at rest.
         std: (state_dim,) standard deviation of a birth.
-        sensors, scans, poses: one per sensor; a scan is None if the sensor did not scan.
+        sensors, scans, poses: one per sensor. A scan is None if the sensor did not scan.
     """
     informative = [
         (sensor, np.ascontiguousarray(scan, np.float64), pose_vector("pose", pose))

@@ -45,7 +45,7 @@ class UnexplainedMeasurements(NamedTuple):
 def check_measured_births(birth: BirthModel, sensors: Sequence[SensorModel], *, each: bool) -> None:
     """Raise `InputError` for births from measurements if these cannot be placed (no `places`).
 
-    each: True if every sensor starts tracks by itself; else one sensor with places is enough.
+    each: True if every sensor starts tracks by itself, else one sensor with places is enough.
     """
     without = [s for s, sensor in enumerate(sensors) if sensor.measurement.places is None]
     if birth.from_measurements is not None and without and (each or len(without) == len(sensors)):
@@ -69,7 +69,7 @@ def tracker_births(birth: BirthModel, local: Any) -> BirthModel:
 
 @lru_cache(maxsize=100)
 def _births_at_sites(birth: BirthModel) -> BirthModel:
-    """Return the births at sites; the same object for each model, since filters cache what they derive from it."""
+    """Return the births at sites, the same object for each model, since filters cache what they derive from it."""
     return replace(birth, from_measurements=None)
 
 
@@ -77,7 +77,7 @@ def birth_candidates(birth: BirthModel, step: int, dt: float, measured: LMB | No
     """Return the birth candidates of the `dt` seconds before a step, at sites and from measurements.
 
     Returns None if there are births at sites only, which filters add themselves. measured: the result of
-    `births_from_scans` for this step; None without a scan.
+    `births_from_scans` for this step, or None without a scan.
     """
     if birth.from_measurements is None:
         return None
@@ -96,16 +96,16 @@ def births_from_scans(
     *,
     owner: int | None = None,
 ) -> LMB | None:
-    """Return the birth candidates for `step` from the scans before it; several sensors' measurements are pooled.
+    """Return the birth candidates for `step` from the scans before it. Several sensors' measurements are pooled.
 
     Sensors whose measurements have no places, such as cameras, make none.
 
     Args:
-        birth: birth model; None is returned if its `from_measurements` is None.
+        birth: birth model. None is returned if its `from_measurements` is None.
         belief: belief after those scans.
-        sensors, scans, poses: one per sensor; a scan is None if the sensor did not scan.
-        step: step in the labels of the births; their indices follow those of the sites.
-        owner: sensor that makes the births alone, with its own range of indices; None: all sensors together.
+        sensors, scans, poses: one per sensor. A scan is None if the sensor did not scan.
+        step: step in the labels of the births. Their indices follow those of the sites.
+        owner: sensor that makes the births alone, with its own range of indices. None: all sensors together.
 
     Raises:
         InputError: a belief without labels, or a measurement that does not determine the position of its target.
@@ -146,7 +146,7 @@ def combine_births(birth: BirthModel, earlier: LMB | None, later: LMB | None) ->
 def unexplained_measurements(
     model: MeasurementBirth, belief: LabelledDensity, sensors: Sequence[SensorModel], scans: Sequence[Any], poses: Any
 ) -> UnexplainedMeasurements:
-    """Return the measurements that no track explains with certainty, pooled over sensors; see `births_from_scans`."""
+    """Return the measurements that no track explains with certainty, pooled over sensors. See `births_from_scans`."""
     lmb = _as_kernel(belief)
     by_sensor = [
         _unexplained_by_sensor(lmb, sensor, scans[s], pose_vector("pose", poses[s]), s)
@@ -167,7 +167,7 @@ def births_from_received_scans(
     step: int,
     received: Sequence[int],
 ) -> LMB | None:
-    """Return `births_from_scans` for the scans of the sensors `received`; if some are missing, the first owns them."""
+    """Return `births_from_scans` for the scans of the sensors `received`. If some are missing, the first owns them."""
     received_scans = [scan if s in received else None for s, scan in enumerate(scans)]
     owner = None if len(received) == len(sensors) else received[0]
     return births_from_scans(birth, belief, sensors, received_scans, poses, step, owner=owner)
@@ -257,7 +257,7 @@ class _Cells:
     """Index of groups by grid cell, so that each measurement is compared with nearby groups only."""
 
     def __init__(self, reach: Floats) -> None:
-        """reach: (2,) in m, along each axis; groups closer than this along both axes are found."""
+        """reach: (2,) in m, along each axis. Groups closer than this along both axes are found."""
         self._size = reach * (1.0 + 1e-9)  # margin for rounding
         self._groups: defaultdict[tuple[float, float], set[int]] = defaultdict(set)
 

@@ -60,7 +60,7 @@ class MultiSensorFilterTracker:
         filter: the multi-sensor filter.
 
     Raises:
-        InputError: `filter` is not a multi-sensor filter; births from measurements that do not determine a position.
+        InputError: `filter` is not a multi-sensor filter, or births from measurements that do not determine a position.
     """
 
     filter: CentralFilter
@@ -109,7 +109,7 @@ class Central(MultiSensorFilterTracker):
     """
 
     def with_truth(self, truth: Any) -> Central:
-        """Return the tracker with a run's true targets passed to its filter, if the filter takes them; else itself."""
+        """Return the tracker with a run's true targets passed to its filter, if the filter takes them, else itself."""
         return replace(self, filter=self.filter.with_truth(truth)) if hasattr(self.filter, "with_truth") else self
 
     def initial(self) -> State:
@@ -119,7 +119,7 @@ class Central(MultiSensorFilterTracker):
     def step(
         self, state: State, scans: Sequence[Any], poses: Any, time: float, *, rngs: Sequence[np.random.Generator]
     ) -> tuple[State, TrackerInfo]:
-        """Update the belief with all scans; see `Tracker.step`. Uses only `rngs[0]`."""
+        """Update the belief with all scans. See `Tracker.step`. Uses only `rngs[0]`."""
         pose_array, dt = check_step(state, scans, poses, time, rngs, self, len(self.sensors))
         timer, step = StageTimer(), state.step + 1
         with timer.timing("filter"):

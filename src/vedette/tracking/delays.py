@@ -21,9 +21,9 @@ class Delay:
 
     Attributes:
         probability: probability that a scan is delayed.
-        max_delay: largest delay in s; delays are uniform from 0 to it.
-        start, end: times in s; scans taken before `start` or after `end` arrive at once.
-        window: s; a scan delayed by more than this is lost.
+        max_delay: largest delay in s. Delays are uniform from 0 to it.
+        start, end: times in s. Scans taken before `start` or after `end` arrive at once.
+        window: s. A scan delayed by more than this is lost.
 
     Raises:
         InputError: a probability outside 0 to 1, times that are not numbers, or an end before the start.
@@ -44,7 +44,7 @@ class Delay:
             raise reject("Delay.end", f"a time from start on, {self.start:g} s", self.end)
 
     def sample(self, time: float, rng: np.random.Generator) -> float:
-        """Draw the delay of a scan of this time, in s; always draws two random numbers."""
+        """Draw the delay of a scan of this time, in s. Always draws two random numbers."""
         uniform, fraction = rng.random(2).tolist()
         return self.max_delay * fraction if self.start <= time <= self.end and uniform < self.probability else 0.0
 
@@ -73,7 +73,7 @@ class DelayedScanTracker(TrackerWrapper):
 
     Attributes:
         tracker: the wrapped tracker.
-        delays: delay by the number of a sensor; scans of other sensors arrive at once.
+        delays: delay by the number of a sensor. Scans of other sensors arrive at once.
 
     Raises:
         InputError: `tracker` is not a tracker, an unknown sensor, or a value that is not a `Delay`.
@@ -98,7 +98,7 @@ class DelayedScanTracker(TrackerWrapper):
     def step(
         self, state: State, scans: Sequence[Any], poses: Any, time: float, *, rngs: Sequence[np.random.Generator]
     ) -> tuple[State, TrackerInfo]:
-        """Send the scans of a time, and process those that have arrived by then; see `Tracker.step`.
+        """Send the scans of a time, and process those that have arrived by then. See `Tracker.step`.
 
         The delays of the scans of sensor s are drawn from `rngs[s]`.
         """
@@ -120,7 +120,7 @@ class DelayedScanTracker(TrackerWrapper):
     def _sent(
         self, scans: Sequence[Any], poses: Floats, now: float, rngs: Sequence[np.random.Generator]
     ) -> list[_PendingScan]:
-        """Return the scans of a time that arrive now or later; lost ones are left out."""
+        """Return the scans of a time that arrive now or later. Lost ones are left out."""
         pending = []
         for s, scan in enumerate(scans):
             if scan is not None:

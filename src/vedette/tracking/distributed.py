@@ -26,9 +26,9 @@ class Distributed(LocalFilters):
     """Tracker with a filter at each sensor and a fusion of their beliefs.
 
     Attributes:
-        filters: one per sensor; all have the same target model.
+        filters: one per sensor. All have the same target model.
         targets, sensors: as in `Tracker`.
-        fusion: fusion of the beliefs after every scan; None for a single sensor.
+        fusion: fusion of the beliefs after every scan, or None for a single sensor.
         feedback: True if the fused belief replaces the sensors' own (paper-notes 9). Without feedback, a fusion by
             views counts a sensor that did not scan as if it had, because its belief is its own, from its earlier scans.
         min_detection: without feedback and with births from measurements, a sensor drops labels that it would detect
@@ -64,14 +64,14 @@ class Distributed(LocalFilters):
             check_birth_labels(self.fusion, self.targets)
 
     def initial(self) -> State:
-        """Return the state without targets; its fused belief is the first sensor's."""
+        """Return the state without targets. Its fused belief is the first sensor's."""
         local = tuple(local.initial() for local in self.filters)
         return State(local, local[0], undetected=undetected_intensity(local[0], self.targets.birth))
 
     def step(
         self, state: State, scans: Sequence[Any], poses: Any, time: float, *, rngs: Sequence[np.random.Generator]
     ) -> tuple[State, TrackerInfo]:
-        """Filter each sensor's scan, then fuse the beliefs; see `Tracker.step`."""
+        """Filter each sensor's scan, then fuse the beliefs. See `Tracker.step`."""
         pose_array, dt = check_step(state, scans, poses, time, rngs, self, len(self.filters))
         step, timer, num, birth = state.step + 1, StageTimer(), len(self.filters), self.birth
         births: Sequence[LMB | None] = (None,) * num
@@ -139,7 +139,7 @@ class Distributed(LocalFilters):
     def _measured_births(
         self, local: Sequence[Any], scans: Sequence[Any], poses: Floats, step: int
     ) -> tuple[LMB | None, ...]:
-        """Return each sensor's birth candidates for `step`; one object for all sensors if they share a belief."""
+        """Return each sensor's birth candidates for `step`, as one object for all sensors if they share a belief."""
         birth, sensors = self.birth, self.sensors
         if self.feedback or len(local) == 1:
             return (births_from_scans(birth, local[0], sensors, scans, poses, step),) * len(local)

@@ -33,14 +33,14 @@ class LocalFilters:
     """Base of trackers with a filter at each sensor.
 
     Attributes:
-        filters: one per sensor; all have the same target model. Several filters always use labelled births, because
+        filters: one per sensor. All have the same target model. Several filters always use labelled births, because
             two sensors' first detections of one target would otherwise be two labels.
         targets: target model that all sensors share.
         sensors: model of each sensor.
 
     Raises:
-        InputError: no filter, an object that is not a filter, or filters with different target models; for births from
-            measurements, filters or measurements that do not support them.
+        InputError: no filter, an object that is not a filter, or filters with different target models, or for births
+            from measurements, filters or measurements that do not support them.
     """
 
     filters: tuple[Filter, ...]

@@ -23,7 +23,7 @@ _MIN_PROBABILITY = 1e-300  # lower bound of a probability in a denominator
 
 
 def lost_labels(before: Any, after: Sequence[Any]) -> LMB | None:
-    """Return the labels of a belief that no belief after the next scan has; None if the beliefs have no labels."""
+    """Return the labels of a belief that no belief after the next scan has, or None if the beliefs have no labels."""
     if not all(isinstance(belief, LabelledDensity) for belief in (before, *after)):
         return None
     labels = [existence_probabilities(belief)[0] for belief in {id(belief): belief for belief in after}.values()]
@@ -40,8 +40,8 @@ def expected_lost_targets(
 
         r p int q f / (1 - r p + r p int q f)
 
-    and the density is proportional to q f. f is evaluated at nodes, whose shares go to the cells that contain them;
-    nodes outside of the grid do not count.
+    and the density is proportional to q f. f is evaluated at nodes, whose shares go to the cells that contain them.
+    Nodes outside of the grid do not count.
 
     scanned: the sensors that scanned, and their poses.
     """
@@ -87,7 +87,7 @@ def _position_nodes(means: Floats, covs: Floats) -> Floats:
 
 
 def expected_in_cells(states: Floats, shares: Floats, grid: CellGrid) -> Floats:
-    """Sum of the shares (n,) of states (n, 2 or more) in each cell, (num_cells,); states outside do not count."""
+    """Sum of the shares (n,) of states (n, 2 or more) in each cell, (num_cells,). States outside do not count."""
     cells = grid.cells_at(states)
     return np.bincount(cells[cells >= 0], shares[cells >= 0], grid.num_cells).astype(np.float64)
 
@@ -102,7 +102,7 @@ def drop_forgotten_labels(
     covariance of its position is less than `max_existence` / (std_x std_y). When such a target comes back into view,
     the birth from its first measurement has more information than the label.
 
-    views: fields of view of all sensors; each sensor is taken to have scanned.
+    views: fields of view of all sensors. Each sensor is taken to have scanned.
     """
     lmb = as_lmb(belief)
     covs = track_moments(lmb.tracks)[1][:, :2, :2]

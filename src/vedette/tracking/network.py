@@ -27,15 +27,15 @@ class Network:
     """Radio network of moving sensors, in which every message is passed on from neighbour to neighbour.
 
     Attributes:
-        radio_range: distance up to which two sensors have a link; none: unlimited [m].
-        max_hops: maximum number of links that a message may travel; none: unlimited.
+        radio_range: distance up to which two sensors have a link. none: unlimited [m].
+        max_hops: maximum number of links that a message may travel. none: unlimited.
         link_loss_probability: probability that a link fails at a scan, in both directions, for all messages.
         delay: number of scans that a message takes for each link.
         consensus_rounds: rounds of averaging with the neighbours (Metropolis weights) after each scan, instead of
-            passing messages on; for fusions of densities; none: no consensus.
+            passing messages on, for fusions of densities. none: no consensus.
 
     Raises:
-        InputError: an invalid field; the message has its name, the expected and the given value.
+        InputError: an invalid field. The message has its name, the expected and the given value.
     """
 
     radio_range: Limit = math.inf
@@ -69,7 +69,7 @@ class Network:
     def arrivals(self, hops: Ints, step: int) -> Ints:
         """Step at which sensor i has the message that sensor j sends now, or `NEVER`, (num_sensors, num_sensors).
 
-        hops: `hop_counts` of the links of this step; messages travel over the links of the step at which they are sent.
+        hops: `hop_counts` of the links of this step. Messages travel over the links of the step at which they are sent.
         step: number of the step, where all steps at one time count once.
         """
         return np.where(self.reaches(hops), step + self.delay * np.minimum(hops, len(hops)), NEVER)
@@ -104,7 +104,7 @@ def received_from(sensor: int, arrives: Ints, step: int) -> tuple[int, ...]:
 
 
 def hop_counts(links: Bools) -> Ints:
-    """Smallest number of links between any two sensors, (n, n); 0 on the diagonal, `NEVER` if not connected."""
+    """Smallest number of links between any two sensors, (n, n), with 0 on the diagonal, `NEVER` if not connected."""
     reached = np.eye(len(links), dtype=np.bool_)
     hops, count = np.where(reached, 0, NEVER), 0
     while reached.any():  # sensors first reached over the last link

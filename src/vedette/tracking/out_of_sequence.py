@@ -28,7 +28,7 @@ class SensorScan(SummaryRepr):
     Attributes:
         sensor: number of the sensor in the tracker, from 0.
         time: time of the scan in s.
-        measurements: (num, meas_dim), in any order; angles in radians. Empty without detections.
+        measurements: (num, meas_dim), in any order, with angles in radians. Empty without detections.
         pose: [px, py, heading_rad, ...] of the sensor at that time.
     """
 
@@ -68,10 +68,10 @@ class Timeline(TabularRepr):
     """The instants in the window, which late scans may still change, and the final state before them.
 
     Attributes:
-        final_state: state before all entries; later scans do not change it.
+        final_state: state before all entries. Later scans do not change it.
         final_poses: (num_sensors, 3 or more) poses of the sensors in that state.
         entries: in order of time.
-        newest: latest time of all scans that arrived, in s; None before the first.
+        newest: latest time of all scans that arrived, in s, or None before the first.
         num_processed: number of scans that were used.
         num_late: number of these that arrived after a scan of a later time.
         num_dropped: number of scans that arrived too late.
@@ -141,8 +141,8 @@ class OutOfSequenceTracker:
         tracker: the wrapped tracker.
         poses: (num_sensors, 3 or more) pose of each sensor before its first scan.
         window: length of the window in s, back from the latest scan.
-        seed: seed for filters that draw random numbers; a step has the same numbers whenever it is computed.
-        max_entries: largest number of instants in the window; with more of them, the window becomes shorter.
+        seed: seed for filters that draw random numbers. A step has the same numbers whenever it is computed.
+        max_entries: largest number of instants in the window. With more of them, the window becomes shorter.
 
     Raises:
         InputError: `tracker` is not a tracker, the number of poses differs from that of the sensors, or a window or
@@ -176,7 +176,7 @@ class OutOfSequenceTracker:
         return Timeline(self.tracker.initial(), self._start)
 
     def process(self, timeline: Timeline, scans: Iterable[SensorScan]) -> tuple[Timeline, OutOfSequenceInfo]:
-        """Process scans in their order of arrival; the scans of one call are processed together.
+        """Process scans in their order of arrival. The scans of one call are processed together.
 
         Args:
             timeline: timeline that the previous call returned.
@@ -227,7 +227,7 @@ class OutOfSequenceTracker:
         return self._finalise(updated), info
 
     def state_at(self, timeline: Timeline, time: float) -> State:
-        """Return the state predicted to `time` from the scans so far; the timeline does not change.
+        """Return the state predicted to `time` from the scans so far. The timeline does not change.
 
         Raises:
             InputError: a time before the latest instant.
@@ -292,7 +292,7 @@ class OutOfSequenceTracker:
 def copy_scan(scan: SensorScan, num_sensors: int) -> SensorScan:
     """Return a copy of the scan with its own arrays, so that later changes by the caller have no effect.
 
-    The shape and values of the measurements are not checked here; the tracker checks them at its step. Raises
+    The shape and values of the measurements are not checked here. The tracker checks them at its step. Raises
     `InputError` for an unknown sensor, a time that is not finite, an invalid pose, or measurements without numbers.
     """
     instance("scan", scan, SensorScan)

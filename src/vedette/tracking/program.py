@@ -23,7 +23,7 @@ UNKNOWN_VARIANCE = 1e12
 
 @dataclass(slots=True, eq=False)
 class ProgramFilter:
-    """A `CentralFilter` that gets its estimates from a program; docs/benchmark.md has the messages and answers.
+    """A `CentralFilter` that gets its estimates from a program. See docs/benchmark.md for messages and answers.
 
     The belief is an LMB of the program's answer. A program processes the scans of a run in order. It is started at the
     first scan, with a seed drawn from that scan's random generator.
@@ -69,7 +69,7 @@ class ProgramFilter:
 
         Raises:
             InputError: a step that is not the next, or a command that cannot be started.
-            VedetteError: no answer in time, or an invalid answer; the program is then terminated.
+            VedetteError: no answer in time, or an invalid answer. The program is then terminated.
         """
         if step == 1:
             scene = self.scene()
@@ -135,7 +135,7 @@ class _Row:
 
 
 def _numbers(program: Program, name: str, given: Any, shapes: tuple[tuple[int, ...], ...]) -> Floats:
-    """Return `given` as finite numbers in one of the shapes; otherwise refuse the program's answer."""
+    """Return `given` as finite numbers in one of the shapes. Otherwise refuse the program's answer."""
     try:
         numbers = np.array(given, np.float64)
     except (TypeError, ValueError):

@@ -57,10 +57,10 @@ class ScanNetwork(MultiSensorFilterTracker):
     beliefs (for example when two groups meet again), they merge them first, unless messages are delayed.
 
     Attributes:
-        filter: multi-sensor filter; a scan that was not received is passed to it as None. Its births are labelled,
+        filter: multi-sensor filter. A scan that was not received is passed to it as None. Its births are labelled,
             because sensors with different scans would give different labels to first detections.
         network: radio network between the sensors.
-        merging: fusion of beliefs with different histories; all its weights are replaced by equal ones. It also fuses
+        merging: fusion of beliefs with different histories. All its weights are replaced by equal ones. It also fuses
             the sensors' beliefs into the one that is reported if they differ.
 
     Raises:
@@ -85,7 +85,7 @@ class ScanNetwork(MultiSensorFilterTracker):
     def step(
         self, state: State, scans: Sequence[Any], poses: Any, time: float, *, rngs: Sequence[np.random.Generator]
     ) -> tuple[State, TrackerInfo]:
-        """Send the scans and filter those that have arrived; see `Tracker.step`. Uses only `rngs[0]`."""
+        """Send the scans and filter those that have arrived. See `Tracker.step`. Uses only `rngs[0]`."""
         pose_array, dt = check_step(state, scans, poses, time, rngs, self, len(self.sensors))
         timer, step, num = StageTimer(), state.step + 1, len(self.sensors)
         time_index = state.memory.time_index + (dt > 0.0)

@@ -42,7 +42,7 @@ def save_snapshot(path: str | os.PathLike[str], parts: Mapping[str, Any]) -> Non
             tuples, lists and dictionaries of these.
 
     Raises:
-        InputError: an object of another type, with its place in `parts`; or a path that cannot be written.
+        InputError: an object of another type, with its place in `parts`, or a path that cannot be written.
     """
     writer = _Writer()
     root = writer.node(dict(parts), "parts")
@@ -146,7 +146,7 @@ class _Writer:
 
 
 class _Reader:
-    """Reader of nodes; the value of each node is made once."""
+    """Reader of nodes. The value of each node is made once."""
 
     def __init__(self, arrays: Mapping[str, Any], nodes: list[list[Any]]) -> None:
         self._arrays, self._nodes = arrays, nodes
@@ -189,14 +189,14 @@ class _Reader:
 
 
 def _field_names(kind: type) -> tuple[str, ...] | None:
-    """Return the arguments of a data class or named tuple; None for any other class."""
+    """Return the arguments of a data class or named tuple, or None for any other class."""
     if is_dataclass(kind):
         return tuple(field.name for field in fields(kind) if field.init)
     return getattr(kind, "_fields", None) if issubclass(kind, tuple) else None
 
 
 def _class_of(module: str, name: str) -> Any:
-    """Return a data class or named tuple of the library by its name; None for any other name."""
+    """Return a data class or named tuple of the library by its name, or None for any other name."""
     if not any(module == f"vedette.{package}" or module.startswith(f"vedette.{package}.") for package in _PACKAGES):
         return None
     try:

@@ -24,7 +24,7 @@ class UndetectedTargetTracker(TrackerWrapper):
     """Wrapper of a tracker whose states also have the intensity of undetected targets (`State.undetected`).
 
     The beliefs are bit for bit those of the wrapped tracker. A scan multiplies the expected number in each cell by the
-    mean over the cell of 1 - P_D; the wrapped tracker processes its measurements. Labels that the tracker drops become
+    mean over the cell of 1 - P_D. The wrapped tracker processes its measurements. Labels that the tracker drops become
     undetected again (`expected_lost_targets`). With births from measurements, birth candidates count as undetected
     until they are born, because they are found only if they are observed again: a measurement that is unexplained with
     probability p counts as p times the largest existence of such a birth. All scans are used at once, even if a network
@@ -61,10 +61,10 @@ class UndetectedTargetTracker(TrackerWrapper):
     def step(
         self, state: State, scans: Sequence[Any], poses: Any, time: float, *, rngs: Sequence[np.random.Generator]
     ) -> tuple[State, TrackerInfo]:
-        """Step the wrapped tracker, then update the undetected targets for the same scans; see `Tracker.step`.
+        """Step the wrapped tracker, then update the undetected targets for the same scans. See `Tracker.step`.
 
         Raises:
-            InputError: a state without `undetected`, or with one on another grid; and the errors of the tracker.
+            InputError: a state without `undetected`, or with one on another grid, and the errors of the tracker.
         """
         after, info = self.tracker.step(state, scans, poses, time, rngs=rngs)
         timer = StageTimer()
@@ -81,7 +81,7 @@ class UndetectedTargetTracker(TrackerWrapper):
         return replace(after, undetected=undetected), replace(info, seconds=seconds)
 
     def _predicted(self, state: State, time: float) -> Floats:
-        """Expected number in each cell before the scans of a time, (num_cells,); the initial one for the first."""
+        """Expected number in each cell before the scans of a time, (num_cells,), or the initial one for the first."""
         before, grid = state.undetected, self.model.grid
         if before is None:
             raise InputError("state.undetected: expected an UndetectedIntensity, as of initial(); got None")

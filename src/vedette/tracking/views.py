@@ -34,7 +34,7 @@ class ViewTracker(TrackerWrapper):
     def step(
         self, state: State, scans: Sequence[Any], poses: Any, time: float, *, rngs: Sequence[np.random.Generator]
     ) -> tuple[State, TrackerInfo]:
-        """Step the wrapped tracker, whose beliefs must have labels; see `Tracker.step`."""
+        """Step the wrapped tracker, whose beliefs must have labels. See `Tracker.step`."""
         after, info = self.tracker.step(state, scans, poses, time, rngs=rngs)
         tracks, before = as_lmb(after.fused).tracks, state.unseen or {}
         scanned = np.asarray(poses, np.float64)[[scan is not None for scan in scans], np.newaxis]

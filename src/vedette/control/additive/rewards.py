@@ -37,10 +37,10 @@ class AdditiveRewards:
         table: changes of each label by the scans of each course.
         valuation: contribution of a label to the reward.
         bases: for each sensor, the rows of its own belief without scans.
-        reward: its `combine` turns the sums into rewards; None: the reward is the sum itself.
+        reward: its `combine` turns the sums into rewards. None: the reward is the sum itself.
         cells: expected numbers of undetected targets by cell, and the cells that each course sees.
         prices: (num_courses,) price of each course, in units of the reward.
-        num_threads: threads that may share the work; the result does not depend on it.
+        num_threads: threads that may share the work. The result does not depend on it.
         num_horizons: number of horizons at whose ends labels are evaluated. The labels of each horizon are separate
             labels, one horizon after the other.
     """
@@ -61,7 +61,7 @@ class AdditiveRewards:
 
     @property
     def coefficients(self) -> Floats | None:
-        """Coefficients of the sums, if the reward is linear in them; None if it is not known to be linear."""
+        """Coefficients of the sums, if the reward is linear in them, or None if it is not known to be linear."""
         if self.reward is None:
             return np.ones(1)
         values = self.reward.coefficients if provides(self.reward, LinearReward) else None
@@ -149,7 +149,7 @@ class AdditiveRewards:
         return rewards - self.prices[:, np.newaxis]
 
     def ascend(self, start: Ints, allowed: Allowed) -> tuple[Ints, float, Trace]:
-        """Run one compiled ascent; only for rewards that are linear in their sums."""
+        """Run one compiled ascent, only for rewards that are linear in their sums."""
         coefficients = self.coefficients
         assert coefficients is not None
         return ascend(self.table, self.valuation, coefficients, self.cells, self.prices, allowed, start, _MOST_LINES)
@@ -160,7 +160,7 @@ class AdditiveRewards:
         return sums[..., 0] if self.reward is None else combined(self.reward, sums)
 
     def price(self, actions: Ints) -> Floats:
-        """Return prices (num_joint,) of joint actions (num_joint, num_sensors); -1: not scanning, at no price."""
+        """Return prices (num_joint,) of joint actions (num_joint, num_sensors). -1: not scanning, at no price."""
         prices = self.prices[np.maximum(actions, 0) + self.table.first_courses[:-1]]
         return np.asarray(np.where(actions >= 0, prices, 0.0).sum(axis=1))
 
@@ -214,7 +214,7 @@ def valuation_of(reward: Any, prediction: LMB, prior: Floats, undetected: float 
 
 
 def _of_prediction(prediction: LMB, exponents: Floats, log_volume: float, logits: Floats) -> Floats:
-    """Return log(1 - r) times a, (num_labels, num_exponents); for pairs (a, 0) the whole term."""
+    """Return log(1 - r) times a, (num_labels, num_exponents), or for pairs (a, 0) the whole term."""
     dim = prediction.state_dim
     log_dets = np.linalg.slogdet(prediction.tracks.covs)[1] + dim * LOG_2PI
     terms = np.outer(log_expit(-logits), exponents[:, 0])

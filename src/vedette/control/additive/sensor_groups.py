@@ -59,7 +59,7 @@ class Samples(NamedTuple):
         return cls(states, np.zeros(2, np.int64), np.full((fused.tracks.num_tracks, 1), -1))
 
     def futures(self, meas_dim: int, settings: PlanningSettings, *, rng: np.random.Generator) -> SampledTrajectories:
-        """Return the trajectories for one sensor; draws random numbers for detections and noise if they are needed."""
+        """Return the trajectories for one sensor. Draws random numbers for detections and noise if they are needed."""
         mode = IDEAL_MODES[settings.ideal_measurements]
         shape = self.states.shape[:2]
         uniforms = rng.random(shape) if mode != IDEAL else np.empty((0, 0))
@@ -125,7 +125,7 @@ def prepare_groups(task: Task, missing_existence: float, *, rng: np.random.Gener
 
 
 def _alike(task: Task, *, shared: bool) -> list[tuple[int, ...]]:
-    """Return groups of sensors with the same belief and equal models; each sensor alone unless `shared`."""
+    """Return groups of sensors with the same belief and equal models, or each sensor alone unless `shared`."""
     if not shared:
         return [(s,) for s in range(len(task.sensors))]
     groups: dict[object, list[int]] = {}
@@ -162,7 +162,7 @@ def _without_scans(
 
 
 def _spread(group: SensorGroup, prior: Floats, missing_existence: float) -> Floats:
-    """Return rows for all labels; a label that the sensor lacks gets the existence `missing_existence` or less."""
+    """Return rows for all labels. A label that the sensor lacks gets the existence `missing_existence` or less."""
     if group.rows is prior:
         return prior
     rows = np.zeros_like(prior)

@@ -117,7 +117,7 @@ def _seen(table: Table) -> Table:
 
 
 def _reach(group: SensorGroup, num_threads: int, *, sampled: bool) -> Ints:
-    """Return (num_courses, num_own): 1 where a course reaches a label; without samples, where it might."""
+    """Return (num_courses, num_own): 1 where a course reaches a label, or without samples, where it might."""
     num_courses, belief, decision = int(group.course_offsets[-1]), group.belief, group.decision
     out = np.empty((num_courses, len(group.labels)), np.int64)
     if not sampled:

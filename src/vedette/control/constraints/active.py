@@ -18,7 +18,7 @@ from vedette.platforms.operated import LEFT
 @part("max_active", "constraint")
 @dataclass(frozen=True, slots=True)
 class MaxActive(Checked):
-    """A limit on the number of sensors that scan after a decision; the others take an action that switches them off.
+    """A limit on the number of sensors that scan after a decision. The others take an action that switches them off.
 
     Each course of a sensor that can be switched is listed a second time without scans. The constraint therefore forbids
     no course and no pair of courses by itself: the planner chooses which sensors scan.
@@ -54,7 +54,7 @@ class Active(NamedTuple):
     """The courses that scan, and the number of sensors that may scan.
 
     on: (num_courses,) whether each course scans, one array per sensor.
-    off: (num_courses,) index of the course with the same poses that does not scan; the course itself if it does not
+    off: (num_courses,) index of the course with the same poses that does not scan, or the course itself if it does not
         scan, or if its sensor cannot be switched off.
     limit: number of sensors that may scan.
     """
@@ -71,13 +71,13 @@ class Active(NamedTuple):
         return np.maximum(num_scanning - self.limit, 0)
 
     def is_full(self, at: Sequence[int], sensor: int) -> bool:
-        """Return True if no further sensor may scan, given the other sensors' courses; below 0: undecided, and off."""
+        """Return True if no further sensor may scan, given the other sensors' courses. Below 0: undecided, and off."""
         return sum(bool(self.on[s][own]) for s, own in enumerate(at) if s != sensor and own >= 0) >= self.limit
 
     def within_limit(self, at: Sequence[int], gains: Sequence[float] | None = None) -> tuple[int, ...]:
         """Return a joint action in which sensors beyond `limit` are off, on courses of the same poses.
 
-        gains: value of each sensor's scans; the sensors with the largest keep scanning, of equal ones the first. None:
+        gains: value of each sensor's scans. The sensors with the largest keep scanning, of equal ones the first. None:
         sensors keep scanning in order from a sensor that depends on the joint action, so that random draws favour no
         sensor.
         """
@@ -95,7 +95,7 @@ class Active(NamedTuple):
 
 
 def active_of(constraints: Sequence[Constraint], courses: Sequence[Floats], scans: Sequence[Bools]) -> Active | None:
-    """Return the limit on active sensors given by constraints; None if there is no limit or scans are not known.
+    """Return the limit on active sensors given by constraints, or None if there is no limit or scans are not known.
 
     courses: (num_courses, num_times, pose_dim) for each sensor. scans: (num_courses, num_times) whether they scan.
     """

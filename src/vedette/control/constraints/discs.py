@@ -38,7 +38,7 @@ def disc_probabilities(offsets: Floats, gaussians: Ints, covs: Floats, radius: f
     where h = r cos t. As a function of t on the full circle the integrand is periodic and analytic, so the midpoint
     rule converges geometrically: 8 r / s + 40 nodes. Nodes beyond 8 s from the mean are omitted.
 
-    covs: (num_gaussians, 2, 2); `gaussians` (num,) are their indices. Discs wholly within 8 l have probability 1, discs
+    covs: (num_gaussians, 2, 2). `gaussians` (num,) are their indices. Discs wholly within 8 l have probability 1, discs
     beyond it 0.
     """
     variances, axes = np.linalg.eigh(covs)

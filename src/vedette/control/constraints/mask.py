@@ -30,10 +30,10 @@ class Mask:
 
     Attributes:
         single: (num_courses,) allowed courses of each sensor, one array per sensor.
-        together: (num_courses of i, of j) compatible courses of sensors i < j, by (i, j); all courses of other pairs
+        together: (num_courses of i, of j) compatible courses of sensors i < j, by (i, j). All courses of other pairs
             are compatible.
         notes: notes for readers of the decision.
-        active: the courses that scan, and the number of sensors that may; None: all may.
+        active: the courses that scan, and the number of sensors that may. None: all may.
 
     Raises:
         InputError: a table of the wrong shape, or of a pair that does not exist.
@@ -85,14 +85,14 @@ class Mask:
     def others(self, sensor: int) -> Mapping[int, Ints]:
         """Return the sensors that `sensor` may conflict with, each with its table of conflicts.
 
-        A table has shape (num_courses of the other, num_courses of `sensor`); 1: conflict.
+        A table has shape (num_courses of the other, num_courses of `sensor`). 1: conflict.
         """
         return self._conflicts[sensor]
 
     def conflicts(self, at: Sequence[int], sensor: int) -> Ints:
         """Return (num_courses,) the violations that each course of one sensor causes with the others' courses.
 
-        at: courses; negative ones belong to undecided sensors, which cause no conflict.
+        at: courses. Negative ones belong to undecided sensors, which cause no conflict.
         """
         conflicts = self.forbidden(at, sensor)
         if self.active is not None and self.active.is_full(at, sensor):
@@ -109,7 +109,7 @@ class Mask:
 
 
 def nearest_feasible(mask: Mask, start: Sequence[int]) -> tuple[int, ...]:
-    """Return a joint action with few violations near `start`: none if one is found; `start` if it has none.
+    """Return a joint action with few violations near `start`: none if one is found, and `start` if it has none.
 
     Sensor by sensor, each takes its course with the fewest violations, as long as this improves any. The remaining
     conflicts are searched by branch and bound, for each group of conflicting sensors, with a limit on the number of
@@ -129,7 +129,7 @@ def nearest_feasible(mask: Mask, start: Sequence[int]) -> tuple[int, ...]:
 
 
 def relaxed(mask: Mask) -> tuple[Mask, tuple[int, ...]]:
-    """Return the mask and a joint action that it allows; if none was found, the mask is relaxed as little as possible.
+    """Return the mask and a joint action that it allows. If none was found, the mask is relaxed as little as possible.
 
     A sensor without an allowed course may take any. Then the violations of the joint action with the fewest are
     permitted: its forbidden courses, and all courses of its incompatible pairs of sensors. No joint action that the
@@ -187,9 +187,9 @@ def _group(mask: Mask, sensor: int) -> list[int]:
 def depth_first(
     start: _Node, ways: Callable[[_Node], Iterator[_Node | None]], is_end: Callable[[_Node], bool], tries: int
 ) -> _Node | None:
-    """Return the first end node of a depth-first search with backtracking; None if none is found within `tries`.
+    """Return the first end node of a depth-first search with backtracking, or None if none is found within `tries`.
 
-    ways: successors of a node; None is a closed branch, which counts as a try.
+    ways: successors of a node. None is a closed branch, which counts as a try.
     """
     waiting: list[Iterator[_Node | None]] = [iter((start,))]
     for _ in range(tries):

@@ -99,7 +99,7 @@ def _answers(constraint: Constraint, situation: ConstraintContext) -> list[Bools
 
 
 def _violations(constraint: Constraint, situation: ConstraintContext, answers: Sequence[Bools]) -> Sequence[Floats]:
-    """Return (num_courses,) the violation of each course; 1 for a forbidden course if the amount is not given."""
+    """Return (num_courses,) the violation of each course, or 1 for a forbidden course if the amount is not given."""
     if not provides(constraint, QuantifiedConstraint):
         return [np.asarray(~own, np.float64) for own in answers]
     given = [np.asarray(own, np.float64) for own in constraint.violations(situation)]

@@ -31,8 +31,8 @@ class VisibilityGraph:
         nodes: (num_nodes, 2) m, the corners at which paths may bend, `MARGIN` outside the zones.
         coast: (num_points, 2) m, points where free space extends farthest into the zones: at their other corners, and
             where edges of two zones cross.
-        lengths: (num_nodes, num_nodes) m, lengths of the shortest paths between nodes; inf if there is none.
-        before: (num_nodes, num_nodes) the node before the second one on the path from the first; below 0: none.
+        lengths: (num_nodes, num_nodes) m, lengths of the shortest paths between nodes, or inf if there is none.
+        before: (num_nodes, num_nodes) the node before the second one on the path from the first. Below 0: none.
     """
 
     edges: Edges
@@ -96,7 +96,7 @@ class VisibilityGraph:
         return np.asarray(touched.reshape(courses.shape[:2]).any(axis=1))
 
     def free_fraction(self, starts: Floats, ends: Floats) -> Floats:
-        """Return the fraction (num,) of each line from start to end (num, 2) before it touches a zone; 1: all."""
+        """Return the fraction (num,) of each line from start to end (num, 2) before it touches a zone. 1: all."""
         shares = first_touches(starts, ends, self.edges, _inside(self.edges, starts))
         length = np.maximum(np.hypot(*(ends - starts).T), MARGIN)
         return np.where(np.isinf(shares), 1.0, np.maximum(shares - MARGIN / length, 0.0))
@@ -137,7 +137,7 @@ class Paths:
         graph: visibility graph of the zones that the paths avoid.
         points: (num_goals, 2) m, end points of the paths: the goals, or the nearest points that paths reach.
         left: (num_goals,) m, distance from these points to the goals.
-        lengths: (num_nodes, num_goals) m, path length from each node to each point; inf if there is no path.
+        lengths: (num_nodes, num_goals) m, path length from each node to each point, or inf if there is no path.
         last: (num_nodes, num_goals) the last node on that path.
     """
 
@@ -154,7 +154,7 @@ class Paths:
     def distances(self, starts: Floats) -> Floats:
         """Return the lengths (num_starts, num_goals) m of shortest paths from starts (num_starts, 2) to the goals.
 
-        The last part, from the points to the goals, is straight; so is the first part out of a zone that contains a
+        The last part, from the points to the goals, is straight. So is the first part out of a zone that contains a
         start. inf: no path.
         """
         graph, origins = self.graph, self.graph.outside(starts)
@@ -189,7 +189,7 @@ class Paths:
 
 
 def visibility_graph(constraints: Sequence[Constraint] = ()) -> VisibilityGraph:
-    """Return the visibility graph of the zones of constraints; without zones all paths are straight.
+    """Return the visibility graph of the zones of constraints. Without zones all paths are straight.
 
     The graph of the same zones is built once and shared by all decisions, planners and runs.
     """

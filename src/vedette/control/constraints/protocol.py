@@ -20,11 +20,11 @@ class ConstraintContext(NamedTuple):
 
     courses: (num_courses, num_times, pose_dim) poses of each course, one array per sensor.
     times: (num_times,) s from now.
-    beliefs: the fused belief predicted to each of `times`, one Gaussian per track; () if no constraint needs it.
-    poses: (num_sensors, pose_dim) present poses, from which the way to the first of `times` starts; None: this way is
+    beliefs: the fused belief predicted to each of `times`, one Gaussian per track, or () if no constraint needs it.
+    poses: (num_sensors, pose_dim) present poses, from which the way to the first of `times` starts. None: this way is
         not tested.
-    scans: (num_courses, num_times) whether each course lets its sensor scan, one array per sensor; (): not known.
-    unseen: seconds since a scan had each label in view (`State.unseen`); None: not known.
+    scans: (num_courses, num_times) whether each course lets its sensor scan, one array per sensor. (): not known.
+    unseen: seconds since a scan had each label in view (`State.unseen`). None: not known.
     """
 
     courses: tuple[Floats, ...]
@@ -44,7 +44,7 @@ class ConstraintContext(NamedTuple):
         return with_start(self.courses[sensor][:, :, :2], self.poses[sensor, :2])
 
     def is_fixed(self, sensor: int) -> bool:
-        """Return True if no course moves the sensor; False if `poses` is not known."""
+        """Return True if no course moves the sensor, False if `poses` is not known."""
         return self.poses is not None and bool((self.courses[sensor][:, :, :2] == self.poses[sensor, :2]).all())
 
     def of_movable(self, values: Floats) -> tuple[Floats, ...]:
@@ -66,7 +66,7 @@ class Constraint(Protocol):
 
     It may have optional members: those of `RangeLimitedConstraint`, `TimeInvariantConstraint`, `QuantifiedConstraint`,
     `ZoneConstraint` and `ActivationConstraint`. Decisions over several periods evaluate it for one or two sensors at a
-    time; the other sensors then have no courses.
+    time. The other sensors then have no courses.
     """
 
     @property
@@ -84,7 +84,7 @@ class Constraint(Protocol):
         ...
 
     def pairs(self, situation: ConstraintContext, first: int, second: int) -> Bools | None:
-        """Return (num_courses of first, of second) the compatible courses of two sensors; None: all."""
+        """Return (num_courses of first, of second) the compatible courses of two sensors. None: all."""
         ...
 
 
@@ -94,7 +94,7 @@ class RangeLimitedConstraint(Protocol):
 
     @property
     def interaction_range(self) -> float:
-        """Distance in m within which courses may be incompatible; 0: never. Without this member there is no limit."""
+        """Distance in m within which courses may be incompatible. 0: never. Without this member there is no limit."""
         ...
 
 
@@ -104,25 +104,25 @@ class TimeInvariantConstraint(Protocol):
 
     @property
     def time_invariant(self) -> bool:
-        """Whether answers depend only on poses and courses, not on times or beliefs; False without this member."""
+        """Whether answers depend only on poses and courses, not on times or beliefs, False without this member."""
         ...
 
 
 @runtime_checkable
 class QuantifiedConstraint(Protocol):
-    """A constraint that gives the amount by which courses violate it; without it a forbidden course counts 1.
+    """A constraint that gives the amount by which courses violate it. Without it a forbidden course counts 1.
 
     If a sensor has no course that all constraints allow, it may take those with the smallest sum of violations.
     """
 
     def violations(self, situation: ConstraintContext) -> tuple[Floats, ...]:
-        """Return (num_courses,) the violation of each course, one array per sensor; above 0 if it is not allowed."""
+        """Return (num_courses,) the violation of each course, one array per sensor, above 0 if it is not allowed."""
         ...
 
 
 @runtime_checkable
 class ZoneConstraint(Protocol):
-    """A constraint that forbids an area at all times; plans find paths around it beyond their horizon."""
+    """A constraint that forbids an area at all times. Plans find paths around it beyond their horizon."""
 
     @property
     def zone(self) -> tuple[Floats, ...]:
@@ -141,7 +141,7 @@ class ActivationConstraint(Protocol):
 
 
 def interaction_range_of(constraint: Constraint) -> float:
-    """Return the distance in m within which a constraint may forbid pairs; see `RangeLimitedConstraint`."""
+    """Return the distance in m within which a constraint may forbid pairs. See `RangeLimitedConstraint`."""
     return constraint.interaction_range if provides(constraint, RangeLimitedConstraint) else math.inf
 
 

@@ -64,7 +64,7 @@ class KeepOut(PerSensorConstraint):
     may be inside.
 
     Attributes:
-        area: a `Region`, or the corners (num_corners, 2) of a polygon in order, m, 3 or more; the interior of a polygon
+        area: a `Region`, or the corners (num_corners, 2) of a polygon in order, m, 3 or more. The interior of a polygon
             that crosses itself is determined by the even-odd rule. Its edge is forbidden, too.
         holes: polygons inside the area that are allowed, except for their edges: a lake on an island.
 
@@ -94,7 +94,7 @@ class KeepOut(PerSensorConstraint):
         return (self.area.corners if isinstance(self.area, Region) else self.area, *self.holes)
 
     def violations(self, situation: ConstraintContext) -> tuple[Floats, ...]:
-        """Return the depth in m inside the area, averaged over the way's corners; nearly 0 if only a leg crosses it."""
+        """Return the depth in m inside the area, averaged over the way's corners, nearly 0 if only a leg crosses it."""
         edges = self._edges
         ways = np.concatenate([situation.ways(s) for s in range(len(situation.courses))])
         inside, crosses = inside_edges(ways, edges), _cross(ways, edges)

@@ -33,8 +33,8 @@ class Revisit(PerSensorConstraint):
     apply the constraint on targets to the first.
 
     Attributes:
-        places: (num_places, 2) m, those of `Patrolling`; (): all targets.
-        radius: m, distance within which a platform is at a place, or a sensor has a target in view; a camera must also
+        places: (num_places, 2) m, those of `Patrolling`. (): all targets.
+        radius: m, distance within which a platform is at a place, or a sensor has a target in view. A camera must also
             have it in its field of view.
         every: s.
         existence: minimum existence probability of the targets.

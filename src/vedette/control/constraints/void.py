@@ -52,9 +52,9 @@ class VoidProbability(PerSensorConstraint, Checked):
 def void_probability(belief: LabelledDensity, centres: Floats, radius: float) -> Floats:
     """Return the probability (num,) that no target is within `radius`, m, of `centres` (num, 2).
 
-    With P_l the probability of the disc under a track: the product over l of 1 - r_l P_l for an LMB; for a GLMB the sum
-    over hypotheses of weight times the product over their tracks of 1 - P_l (Beard et al., as in `VoidProbability`);
-    for a product of GLMBs the product of theirs. Tracks with less than 1.3e-14 in the disc are ignored. Raises
+    With P_l the probability of the disc under a track: the product over l of 1 - r_l P_l for an LMB. For a GLMB the sum
+    over hypotheses of weight times the product over their tracks of 1 - P_l (Beard et al., as in `VoidProbability`).
+    For a product of GLMBs the product of theirs. Tracks with less than 1.3e-14 in the disc are ignored. Raises
     `InputError` for invalid centres, or a radius that is not above 0.
     """
     positive("radius", radius)

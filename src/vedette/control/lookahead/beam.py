@@ -19,7 +19,7 @@ class BeamSearch:
     """A search of one sensor at a time, with a beam of its best beginnings that grows decision by decision.
 
     The value of a beginning is that of the sequence that repeats its last action until the end. So the far future
-    counts from the first decision on, and every evaluation is of a whole sequence; ties are broken at random. Starting
+    counts from the first decision on, and every evaluation is of a whole sequence. Ties are broken at random. Starting
     from the best known sequence (a single decision, repeated), sensor by sensor is searched until none alone improves
     it. Then, if the budget allows, all combinations of the sensors' beams are tried, and if one is better, the search
     continues from there. Finally the same is repeated from a start in which each sensor joins those before it, while
@@ -127,7 +127,7 @@ def _is_better(value: float, reference: float) -> bool:
 
 
 def _ranked(values: list[float], rng: np.random.Generator) -> list[int]:
-    """Return the indices of the values, the largest first; equal ones in random order."""
+    """Return the indices of the values, the largest first, equal ones in random order."""
     scale = tie_tolerance(max(map(abs, filter(math.isfinite, values)), default=1.0))
     order = np.lexsort((rng.random(len(values)), -np.round(np.array(values) / scale)))
     return [int(place) for place in order]

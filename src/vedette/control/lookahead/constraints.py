@@ -28,7 +28,7 @@ from vedette.tracking import State
 
 
 class Stages(NamedTuple):
-    """Decisions `stride` pseudo-updates apart; after the last, the horizon of a single decision."""
+    """Decisions `stride` pseudo-updates apart. After the last, the horizon of a single decision."""
 
     depth: int
     stride: int  # pseudo-updates from a decision to the next
@@ -109,7 +109,7 @@ class MultiStepConstraints:
         return pairs_allowed(self.constraints, self._situation(stage, places))
 
     def active(self, places: Mapping[int, Place]) -> Active | None:
-        """Return the limit on active sensors, from all sensors' courses at a decision; None: all may scan."""
+        """Return the limit on active sensors, from all sensors' courses at a decision. None: all may scan."""
         active_places = [places[s] for s in range(len(places))]
         return active_of(self.constraints, [own.courses for own in active_places], [own.scans for own in active_places])
 

@@ -37,7 +37,7 @@ class CourseTree:
         platform: its platform.
         pose: its present pose.
         stages: the decisions.
-        ahead: the constraints; None: there are none.
+        ahead: the constraints. None: there are none.
         now: (num_courses,) which courses are allowed at the first decision, at least one.
         omits_dead_ends: whether dead ends are left out.
     """
@@ -139,7 +139,7 @@ class CourseTree:
         return sequence
 
     def count(self, limit: int) -> int:
-        """Return the number of all sequences; if there are more than `limit`, a number above that."""
+        """Return the number of all sequences, or if there are more than `limit`, a number above that."""
         level: list[Sequence] = [()]
         for _ in range(self.stages.depth - 1):
             level = [(*taken, k) for taken in level for k in self.allowed(taken)]

@@ -49,7 +49,7 @@ class FeasibleSequences:
 
         Dead ends are left out, unless this leaves pairs of sensors no feasible courses at the first decision. If no
         joint sequence is found that satisfies all constraints on pairs, they are tested for as many decisions as one
-        was found for; see `notes`. Raises `InputError` as `feasible_action_mask`.
+        was found for. See `notes`. Raises `InputError` as `feasible_action_mask`.
         """
         mask = ahead.mask({s: tree.place(()) for s, tree in enumerate(trees)})
         bound = tuple(replace(tree, ahead=ahead, now=own) for tree, own in zip(trees, mask.single, strict=True))
@@ -68,7 +68,7 @@ class FeasibleSequences:
         return Mask(single, self.mask.together, active=self.mask.active)
 
     def allows(self, joint: Several[Sequence | None]) -> bool:
-        """Return True if the sequences are allowed together; None: the sensor is not tested."""
+        """Return True if the sequences are allowed together. None: the sensor is not tested."""
         tested = [(s, own) for s, own in enumerate(joint) if own is not None]
         pairs = combinations(tested, 2) if self.ahead.on_pairs else ()
         if not all(self._alone(*each) for each in tested) or not all(
@@ -79,9 +79,9 @@ class FeasibleSequences:
         return all(self._num_active(joint, stage) <= self.most_active for stage in stages)
 
     def after(self, sensor: int, taken: Sequence, others: Several[Sequence | None]) -> Sequence:
-        """Return feasible next courses of one sensor, given the other sensors' choices; may be empty.
+        """Return feasible next courses of one sensor, given the other sensors' choices. There may be none.
 
-        others: for each sensor its courses; those that are None, too short, or the sensor's own are not tested.
+        others: for each sensor its courses. Those that are None, too short, or the sensor's own are not tested.
         """
         feasible, stage = self.trees[sensor].allowed(taken), len(taken) + 1
         for other, own in enumerate(others):
@@ -96,7 +96,7 @@ class FeasibleSequences:
         return feasible
 
     def completed(self, sensor: int, taken: Sequence, others: Several[Sequence | None]) -> Sequence | None:
-        """Return the whole feasible sequence that stays nearest to the last action; None: none found.
+        """Return the whole feasible sequence that stays nearest to the last action. None: none found.
 
         The nearest course is taken from decision to decision, with backtracking from dead ends.
         """
@@ -123,7 +123,7 @@ class FeasibleSequences:
 
     @property
     def most_active(self) -> float:
-        """Number of sensors that may scan; inf: all."""
+        """Number of sensors that may scan. inf: all."""
         return math.inf if self.mask.active is None else self.mask.active.limit
 
     def _num_active(self, joint: Several[Sequence | None], stage: int) -> int:
@@ -152,7 +152,7 @@ class FeasibleSequences:
         return self._together[key]
 
     def _table(self, first: int, one: Sequence, second: int, other: Sequence) -> Bools | None:
-        """Return (num_courses of the first, of the second) compatible courses after the courses taken; None: all."""
+        """Return (num_courses of the first, of the second) compatible courses after the courses taken. None: all."""
         stage = len(one) + 1
         if stage > self.until or not self.ahead.on_pairs:
             return None
@@ -179,10 +179,10 @@ class _Begun(NamedTuple):
 
 
 def _furthest(trees: tuple[CourseTree, ...], ahead: MultiStepConstraints, mask: Mask) -> tuple[Sequence, ...]:
-    """Return courses that all sensors may take together, for as many decisions as possible; perhaps for none.
+    """Return courses that all sensors may take together, for as many decisions as possible, perhaps for none.
 
-    At each decision the courses that repeat the last action, made feasible, are tried first; depth first, with a limit
-    on the tries. mask: of the first decision; allows a joint action.
+    At each decision the courses that repeat the last action, made feasible, are tried first, depth first, with a limit
+    on the tries. mask: of the first decision, which allows a joint action.
     """
     num, depth = len(trees), trees[0].stages.depth
     furthest: tuple[Sequence, ...] = ((),) * num

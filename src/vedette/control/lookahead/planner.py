@@ -66,13 +66,13 @@ class HorizonPlanner:
     depth did not improve on it.
 
     Attributes:
-        sensors, fusion, settings, reward: as in `JointPlanner`; the horizon of the settings is that of one decision.
-            Reward and fusion must be sums over labels; GLMB beliefs are planned on as LMBs, and plans say so.
+        sensors, fusion, settings, reward: as in `JointPlanner`. The horizon of the settings is that of one decision.
+            Reward and fusion must be sums over labels. GLMB beliefs are planned on as LMBs, and plans say so.
         depth: number of decisions.
-        period: s from a decision to the next, a whole multiple of the settings' period; None: their horizon.
+        period: s from a decision to the next, a whole multiple of the settings' period. None: their horizon.
         search: which joint sequences are evaluated, where the budget is too small for all.
         budget: maximum number of joint sequences evaluated.
-        discount: g in [0, 1]; None: only the end counts.
+        discount: g in [0, 1]. None: only the end counts.
         constraints: limits on the sensors' courses, tested at every decision of a sequence: from where its courses
             begin to the end of its horizon, or to the next decision if that is later.
         notes: notes that every plan repeats.
@@ -114,17 +114,17 @@ class HorizonPlanner:
         check_sums("sequences of decisions", len(self.sensors), self.fusion, self.settings, self.reward)
 
     def plan(self, state: State, poses: Floats, *, rng: np.random.Generator) -> Plan:
-        """Return the first actions of the best joint sequence found; of equal ones the first in printed order.
+        """Return the first actions of the best joint sequence found, of equal ones the first in printed order.
 
         If constraints allow no course of a sensor at some decision, all are kept. If no joint sequence is found that
         satisfies all constraints on pairs of sensors, these constraints are dropped from some decision on. The notes
         say so. The tables contain the first actions, each with the value of the best sequence found that begins with
-        it; the whole sequence is in `Plan.sequence`, and the counts of the curve are of joint sequences. Arguments as
-        in `JointPlanner.plan`; the search draws random numbers after the samples.
+        it. The whole sequence is in `Plan.sequence`, and the counts of the curve are of joint sequences. Arguments as
+        in `JointPlanner.plan`. The search draws random numbers after the samples.
 
         Raises:
             InputError: invalid inputs.
-            ModelError, NumericalError: errors of the filters; no sequence with a finite reward.
+            ModelError, NumericalError: errors of the filters, or no sequence with a finite reward.
         """
         generator(rng)
         why = "so are all sequences of decisions"
@@ -212,7 +212,7 @@ class HorizonPlanner:
     def _plan(
         self, given: _Given, evidence: Evidence, choice: tuple[int, ...], problem: SequenceProblem | None
     ) -> Plan:
-        """Return the plan of the best sequence found; problem: None for a single decision."""
+        """Return the plan of the best sequence found. problem: None for a single decision."""
         sequence: JointSequence = tuple((course,) for course in choice)
         if problem is not None:
             sequence, evidence = _best(problem).sequence, Evidence(evidence.evaluator, evidence.which, evidence.rewards)

@@ -28,7 +28,7 @@ Taken: TypeAlias = tuple[Sequence | None, ...]
 
 
 class _Lists:
-    """Appendable lists of entries in several columns; list i is offsets[i]:offsets[i + 1].
+    """Appendable lists of entries in several columns. List i is offsets[i]:offsets[i + 1].
 
     The entries are copied each time the capacity doubles.
     """
@@ -113,7 +113,7 @@ class PrecomputedCourses:
         return Options(tree.options(()).actions, poses, np.arange(num_courses), tree.pose, np.zeros(num_courses), scans)
 
     def _rewards(self) -> AdditiveRewards:
-        """Return the rewards of all courses so far; each sensor may index any of them, and is given its own."""
+        """Return the rewards of all courses so far. Each sensor may index any of them, and is given its own."""
         old = self._additive
         assert old is not None
         (offsets, labels, changes), (cell_offsets, cells, log_miss) = (own.values for own in self._lists)
@@ -140,7 +140,7 @@ class SequenceProblem:
         depth: number of decisions.
         parts: the terms that values are sums of.
         budget: maximum number of joint sequences evaluated.
-        rules: sequences that constraints allow; None: all.
+        rules: sequences that constraints allow. None: all.
         found: for each evaluated joint first action (course indices), the best sequence that begins with it.
     """
 
@@ -165,13 +165,13 @@ class SequenceProblem:
         return max(0, self.budget - len(self._values))
 
     def allows(self, joint: Taken) -> bool:
-        """Return True if constraints allow the sequences together; None: the sensor is not tested."""
+        """Return True if constraints allow the sequences together. None: the sensor is not tested."""
         return self.rules is None or self.rules.allows(joint)
 
     def after(self, sensor: int, taken: Sequence, others: Taken) -> Sequence:
-        """Return the courses that one sensor may take next, given the other sensors' courses; may be empty.
+        """Return the courses that one sensor may take next, given the other sensors' courses. There may be none.
 
-        others: for each sensor; sequences that are None or too short are not tested.
+        others: for each sensor. Sequences that are None or too short are not tested.
         """
         if self.rules is None:
             return self.trees[sensor].allowed(taken)
@@ -187,7 +187,7 @@ class SequenceProblem:
         )
 
     def evaluate(self, joints: Iterable[Taken]) -> list[float]:
-        """Return values of joint sequences, none evaluated twice; -inf for those beyond the budget.
+        """Return values of joint sequences, none evaluated twice, with -inf for those beyond the budget.
 
         A sensor without a sequence (None) does not scan. The value is -inf if it is not finite, and for sequences that
         constraints forbid, which are not evaluated.
@@ -212,7 +212,7 @@ class SequenceProblem:
         return np.asarray(total)
 
     def _keep(self, joints: list[Taken], rewards: Floats, values: Floats) -> None:
-        """Store the best sequence for each first joint action; of equal ones the first in printed order."""
+        """Store the best sequence for each first joint action, of equal ones the first in printed order."""
         for joint, own, value in zip(joints, rewards, values.tolist(), strict=True):
             whole = tuple(taken for taken in joint if taken is not None)
             if len(whole) < self.num_sensors:
@@ -229,7 +229,7 @@ class SequenceProblem:
         self._best.append(max((best.value for best in self.found.values()), default=-math.inf))
 
     def begin(self, choice: tuple[int, ...]) -> None:
-        """Evaluate a first joint sequence: all sensors repeat a joint action; or another that is allowed."""
+        """Evaluate a first joint sequence: all sensors repeat a joint action, or another that is allowed."""
         joint: Taken = tuple((course,) for course in choice)
         for s, own in enumerate(joint):
             whole = None if own is None else self.completed(s, own, joint)
@@ -240,7 +240,7 @@ class SequenceProblem:
             self.evaluate([self.rules.start])
 
     def best(self) -> Best:
-        """Return the best sequence; of those that are equal up to rounding the first in printed order."""
+        """Return the best sequence, of those that are equal up to rounding the first in printed order."""
         each = sorted(self.found.values(), key=lambda best: printed_order(best.sequence))
         return each[first_best(np.array([best.value for best in each]))]
 
@@ -264,7 +264,7 @@ def printed_order(sequence: JointSequence) -> tuple[int, ...]:
 
 @runtime_checkable
 class SequenceSearch(Protocol):
-    """A search for a joint sequence with a large value; the problem stores its evaluations."""
+    """A search for a joint sequence with a large value. The problem stores its evaluations."""
 
     def search(self, problem: SequenceProblem, *, rng: np.random.Generator) -> None:
         """Evaluate whole joint sequences, at least one, within the budget."""

@@ -23,13 +23,13 @@ class TreeSearch:
     A node is a beginning: the courses of all sensors at the first decisions, and of the first sensors at the next one.
     From
     the root the child is taken whose mean value, scaled to the values seen so far, plus
-    exploration sqrt(ln(visits) / visits of the child) is largest, until a node has a child that was never tried; from
+    exploration sqrt(ln(visits) / visits of the child) is largest, until a node has a child that was never tried. From
     there the sequence is completed by a rollout. Branches that are fully evaluated are not entered again.
 
     Attributes:
         exploration: weight of rarely tried branches.
-        rollout: "random": courses drawn at random; "repeat_last": every sensor repeats its last action.
-        batch: rollouts that are evaluated together, which is faster; each counts as a visit before its value is known.
+        rollout: "random": courses drawn at random. "repeat_last": every sensor repeats its last action.
+        batch: rollouts that are evaluated together, which is faster. Each counts as a visit before its value is known.
 
     Raises:
         InputError: an exploration below 0, another rollout, a batch below 1.
@@ -133,7 +133,7 @@ class _Climb:
         return max((item for item in node.children.items() if not item[1].closed), key=bound)[0]
 
     def _completed(self, courses: tuple[int, ...]) -> JointSequence | None:
-        """Return a whole joint sequence with this beginning; None if no feasible one was found."""
+        """Return a whole joint sequence with this beginning, or None if no feasible one was found."""
         num_sensors = self.problem.num_sensors
         taken = [courses[s::num_sensors] for s in range(num_sensors)]
         for s in range(num_sensors):

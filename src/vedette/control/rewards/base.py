@@ -22,7 +22,7 @@ UnitVolume: TypeAlias = float | Literal["reference"]
 
 
 class Reward(Protocol):
-    """A value of an ideally updated density relative to the predicted one; larger is better, and it must be finite.
+    """A value of an ideally updated density relative to the predicted one. Larger is better, and it must be finite.
 
     The prediction has the type of the fused density, the update that of the fusion's output (or, for a sensor alone, of
     its filter's): a marginalised GLMB or an LMB. Tracks are single Gaussians, except in the output of a custom fusion.
@@ -34,12 +34,12 @@ class Reward(Protocol):
 
 @runtime_checkable
 class PowerReward(Protocol):
-    """A reward made of power integrals Z(a, b) of prediction and update; no fused density needs to be formed.
+    """A reward made of power integrals Z(a, b) of prediction and update. No fused density needs to be formed.
 
     Z(a, b) is the log of the set integral of K^((a + b - 1) |X|) predicted(X)^a updated(X)^b over the label sets that
     both have (see `vedette.divergence.power_integral`). The update need not be normalised: exp(Z(0, 1)) is its
     integral. The
-    reward may have the members of `HasUnitVolume` and `LinearReward`, too; without the former K is 1.
+    reward may have the members of `HasUnitVolume` and `LinearReward`, too. Without the former K is 1.
     """
 
     @property
@@ -56,7 +56,7 @@ class PowerReward(Protocol):
 class LabelReward(Protocol):
     """A reward made of sums over the targets: each target is evaluated by itself, and no density needs to be formed.
 
-    Each label adds `num_terms` numbers, which `function` computes from its Bernoulli before and after; `combine` turns
+    Each label adds `num_terms` numbers, which `function` computes from its Bernoulli before and after. `combine` turns
     their sums into the reward.
     """
 
@@ -109,7 +109,7 @@ class LinearReward(Protocol):
 
     @property
     def coefficients(self) -> Sequence[float] | Floats | None:
-        """Coefficients (num,) of the combined numbers; None, as without this member: the reward is not linear."""
+        """Coefficients (num,) of the combined numbers. None, as without this member: the reward is not linear."""
         ...
 
 
@@ -123,7 +123,7 @@ def check_unit_volume(value: Any) -> None:
 
 
 def unit_volume_of(reward: Any, predicted: GLMB | LMB) -> float:
-    """Return K of a reward; "reference" is 1 for a prediction without expected targets, for which K has no effect."""
+    """Return K of a reward. "reference" is 1 for a prediction without expected targets, for which K has no effect."""
     value = getattr(reward, "unit_volume", 1.0)
     check_unit_volume(value)
     if value != "reference":
@@ -132,7 +132,7 @@ def unit_volume_of(reward: Any, predicted: GLMB | LMB) -> float:
 
 
 def combined(reward: PowerReward, z: Floats) -> Floats:
-    """Return the rewards (...) of z (..., num_exponents); `InputError` unless `combine` gives a number for each."""
+    """Return rewards (...) of z (..., num_exponents). Raises `InputError` unless `combine` gives a number for each."""
     try:
         rewards = np.asarray(reward.combine(z), np.float64)
     except (TypeError, ValueError) as fault:
@@ -151,7 +151,7 @@ def may_replace(thing: Any, method: str, other: str) -> bool:
 
 
 def _of_labels(reward: LabelReward, predicted: GLMB | LMB, updated: GLMB | LMB) -> float:
-    """Return the reward of two densities, GLMBs converted to LMBs; a label missing in the update has existence 0."""
+    """Return the reward of two densities, GLMBs converted to LMBs. A label missing in the update has existence 0."""
     before, after = (as_lmb(density) for density in (predicted, updated))
     places = places_of(before.tracks.labels, after.tracks.labels)
     old, new = track_moments(before.tracks), track_moments(after.tracks)
@@ -166,7 +166,7 @@ def _of_labels(reward: LabelReward, predicted: GLMB | LMB, updated: GLMB | LMB) 
 
 
 def reward_value(reward: Reward | PowerReward | LabelReward, predicted: GLMB | LMB, updated: Any) -> float:
-    """Return the reward of one update; `InputError` if it is not a number."""
+    """Return the reward of one update. Raises `InputError` if it is not a number."""
     value: Any
     if callable(reward) and may_replace(reward, "__call__", "combine"):
         value = reward(predicted, updated)

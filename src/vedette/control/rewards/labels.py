@@ -49,8 +49,8 @@ class _OneSum:
 class KullbackLeiblerReward(_OneSum):
     """Kullback-Leibler divergence of the update from the prediction, label by label: the information gained, in nats.
 
-    With ideal measurements; under `ideal_measurements: sampled` its mean estimates the mutual information of targets
-    and measurements.
+    This holds with ideal measurements. Under `ideal_measurements: sampled` its mean estimates the mutual information of
+    targets and measurements.
     """
 
     sign: ClassVar[float] = 1.0
@@ -58,7 +58,7 @@ class KullbackLeiblerReward(_OneSum):
 
     @property
     def function(self) -> ModelFunction:
-        """Model function of the reward; see `vedette.control.rewards.labels`."""
+        """Model function of the reward. See `vedette.control.rewards.labels`."""
         return kullback_leibler_of_label
 
 
@@ -71,7 +71,7 @@ class CardinalityVarianceReward(_OneSum):
 
     @property
     def function(self) -> ModelFunction:
-        """Model function of the reward; see `vedette.control.rewards.labels`."""
+        """Model function of the reward. See `vedette.control.rewards.labels`."""
         return cardinality_variance_of_label
 
 
@@ -100,7 +100,7 @@ class ExpectedGospaReward(_OneSum, Checked):
 
     @property
     def function(self) -> ModelFunction:
-        """Model function of the reward; see `vedette.control.rewards.labels`."""
+        """Model function of the reward. See `vedette.control.rewards.labels`."""
         return gospa_of_label
 
     @property
@@ -133,7 +133,7 @@ class PeecsReward(Checked):
 
     @property
     def function(self) -> ModelFunction:
-        """Model function of the reward; see `vedette.control.rewards.labels`."""
+        """Model function of the reward. See `vedette.control.rewards.labels`."""
         return peecs_of_label
 
     @property
@@ -142,7 +142,7 @@ class PeecsReward(Checked):
         return np.array([self.cutoff**2])
 
     def combine(self, sums: Floats) -> Floats:
-        """Return the negative weighted errors; 0 if there is no label."""
+        """Return the negative weighted errors, or 0 if there is no label."""
         variance, error, existence, num = np.moveaxis(sums, -1, 0)
         with np.errstate(invalid="ignore", divide="ignore"):
             cardinality = np.where(num > 0.0, 4.0 * variance / num, 0.0)

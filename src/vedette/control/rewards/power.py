@@ -56,7 +56,7 @@ class CauchySchwarzReward:
 class RenyiReward:
     """Renyi divergence of the prediction from the update, normalised on the label sets that both have.
 
-    log(integral of predicted^order updated^(1 - order)) / (order - 1); see `vedette.divergence.renyi`. It needs no K.
+    log(integral of predicted^order updated^(1 - order)) / (order - 1), see `vedette.divergence.renyi`. It needs no K.
 
     Attributes:
         order: exponent of the prediction, above 0 and not 1. 1/2 is symmetric, twice the Bhattacharyya distance. Above
@@ -104,13 +104,13 @@ class ExpectedLossReward(Checked):
 
     This is the mean OSPA of the best estimates, without the part that does not depend on the action. A label that is
     not detected is reported only if this costs less. A false label costs c^p unless another target is missing, for
-    which it counts then. exp(-n) is the probability that none is, with n undetected targets (`State.undetected`; 0 if
-    not known).
+    which it counts then. exp(-n) is the probability that none is, with n undetected targets (`State.undetected`, or 0
+    if not known).
 
     The existence r and the covariance P of the position are predicted, P_D is the mean over the predicted Gaussian, and
     P+ is the covariance after the scans given that the target is detected: P+^-1 = P^-1 + sum over sensors of P_D I /
     q, I the information of a measurement. Over a horizon of several steps, the information of each step is propagated
-    to its end. The reward has no sampling noise; it favours actions that detect every target, and detect it accurately.
+    to its end. The reward has no sampling noise. It favours actions that detect every target, and detect it accurately.
     A label that is a mixture is represented by its heaviest component.
 
     If no target is within detection range of a sensor during the horizon, or a target is out of range of all sensors,

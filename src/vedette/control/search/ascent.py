@@ -25,14 +25,14 @@ _NUM_RESTARTS, _LEAST_GAP, _FIRST_TRIES = 2, 0.01, 1000
 @part("coordinate_ascent", "search")
 @dataclass(frozen=True, slots=True)
 class CoordinateAscent(Checked):
-    """A search of one sensor at a time, the others held, until no sensor alone can do better; for many sensors.
+    """A search of one sensor at a time, the others held, until no sensor alone can do better, for many sensors.
 
     The first ascent starts at the independent decision, so its result is never worse than that. The result is a local
     maximum: no change of one sensor's action improves it, a change of two might. No joint action is evaluated twice.
 
     With a mask it moves from one allowed joint action to another. A start that is not allowed is first replaced by an
-    allowed one near it; if there is none, the mask is relaxed (`vedette.control.constraints.relaxed`). If only some
-    sensors may scan, no sensor alone can change which ones do; then exchanges of two are tried from the best result,
+    allowed one near it. If there is none, the mask is relaxed (`vedette.control.constraints.relaxed`). If only some
+    sensors may scan, no sensor alone can change which ones do. Then exchanges of two are tried from the best result,
     and ascents continue from there.
 
     Attributes:
@@ -45,7 +45,7 @@ class CoordinateAscent(Checked):
     num_restarts: Repeats = 2
 
     def search(self, problem: JointProblem, *, rng: np.random.Generator) -> tuple[int, ...]:
-        """Return the best result of all ascents; of equal ones that were evaluated the first in printed order."""
+        """Return the best result of all ascents, of equal ones that were evaluated the first in printed order."""
         cache = RewardCache(problem)
         ascents(cache, first_starts(cache, self.num_restarts, rng=rng))
         return cache.best()
@@ -57,7 +57,7 @@ def first_starts(cache: RewardCache, num_restarts: int, *, rng: np.random.Genera
 
 
 def ascents(cache: RewardCache, starts: Sequence[Joint]) -> list[Joint]:
-    """Return the results of ascents; they and the first start are then in the cache.
+    """Return the results of ascents. They and the first start are then in the cache.
 
     If only some sensors may scan, exchanges of two and ascents continue from the best result until none improves it.
     """
@@ -83,7 +83,7 @@ def _climbed(cache: RewardCache, start: Joint) -> Joint:
 
 
 def _exchanged(cache: RewardCache, start: Joint, active: Active) -> Joint | None:
-    """Return the best joint action in which another sensor scans instead of one; None: no exchange improves it."""
+    """Return the best joint action in which another sensor scans instead of one. None: no exchange improves it."""
     candidates, value = [start], cache.values.__getitem__
     for s, course in enumerate(start):
         silent = [joint for joint in cache.line(start, s) if not active.on[s][joint[s]]]
@@ -111,7 +111,7 @@ def _ascend(cache: RewardCache, start: Joint) -> Joint:
 @part("automatic", "search")
 @dataclass(frozen=True, slots=True)
 class AutomaticSearch(Checked):
-    """A search of every joint action for up to three sensors; coordinate ascent with restarts for more.
+    """A search of every joint action for up to three sensors, and coordinate ascent with restarts for more.
 
     The ascent has two restarts, or up to 1000 divided by the number of all sensors' courses if the problem has a bound
     that leaves a possible gain of more than 1 %.

@@ -26,13 +26,13 @@ class CrossEntropy(Checked):
     ends when the probabilities are degenerate (every sensor has an action of 0.99), when a round draws nothing new, or
     after `max_rounds`. No joint action is evaluated twice: one that is drawn again keeps its reward.
 
-    With a mask, each sensor's action is drawn from those compatible with the sensors before it; if there are none, the
+    With a mask, each sensor's action is drawn from those compatible with the sensors before it. If there are none, the
     joint action is replaced by an allowed one near it (`vedette.control.constraints.nearest_feasible`, `relaxed`).
 
     Attributes:
         num_samples: joint actions drawn in a round.
         elite_fraction: fraction of these that the probabilities move towards, in (0, 1).
-        smoothing: step size of the probabilities in a round, in (0, 1]; 1: a full step.
+        smoothing: step size of the probabilities in a round, in (0, 1]. 1: a full step.
         max_rounds: maximum number of rounds.
 
     Raises:
@@ -45,7 +45,7 @@ class CrossEntropy(Checked):
     max_rounds: Count = 50
 
     def search(self, problem: JointProblem, *, rng: np.random.Generator) -> tuple[int, ...]:
-        """Return the best joint action drawn; of equal ones the first in printed order."""
+        """Return the best joint action drawn, of equal ones the first in printed order."""
         cache = RewardCache(problem)
         probabilities = _uniform(cache)
         num_elite = math.ceil(self.elite_fraction * self.num_samples)
@@ -65,7 +65,7 @@ class CrossEntropy(Checked):
 
 
 def _uniform(cache: RewardCache) -> Floats:
-    """Return (num_sensors, most courses) equal probabilities for all feasible courses of a sensor; 0 elsewhere."""
+    """Return (num_sensors, most courses) equal probabilities for all feasible courses of a sensor, and 0 elsewhere."""
     shape = cache.problem.shape
     probabilities = np.zeros((len(shape), max(shape)))
     for s in range(len(shape)):

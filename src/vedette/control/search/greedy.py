@@ -18,7 +18,7 @@ from vedette.models.fields import Checked, part
 @part("sequential_greedy", "search")
 @dataclass(frozen=True, slots=True)
 class SequentialGreedy(Checked):
-    """A search that decides sensors one after the other, each by the reward of all; the undecided are assumed to stay.
+    """A search that decides sensors one after the other, each by the reward of all. The undecided are assumed to stay.
 
     The undecided sensors continue as they are (`vedette.control.inputs.stationary_courses`), so that targets that they
     see are not covered twice. The joint action found is never worse than the one in which all sensors stay, if that is
@@ -28,9 +28,9 @@ class SequentialGreedy(Checked):
     the end, by the fewest changes found (`vedette.control.constraints.nearest_feasible`, `relaxed`).
 
     Attributes:
-        order: "sensor_order": in the order of the sensors. "best_first": always the sensor that adds most; its gain is
-            assumed to shrink as others are decided, which saves most of the evaluations (lazy greedy; Minoux 1978). The
-            gain may grow if another sensor leaves a target; such a sensor is then evaluated later than it should be.
+        order: "sensor_order": in the order of the sensors. "best_first": always the sensor that adds most. Its gain is
+            assumed to shrink as others are decided, which saves most of the evaluations (lazy greedy, Minoux 1978). The
+            gain may grow if another sensor leaves a target. Such a sensor is then evaluated later than it should be.
 
     Raises:
         InputError: another order.
@@ -39,7 +39,7 @@ class SequentialGreedy(Checked):
     order: Literal["sensor_order", "best_first"] = "sensor_order"
 
     def search(self, problem: JointProblem, *, rng: np.random.Generator) -> tuple[int, ...]:
-        """Return the joint action decided in this way; nothing is drawn.
+        """Return the joint action decided in this way. Nothing is drawn.
 
         Raises `InputError` for a problem without rewards of sensors that have not decided (`JointProblem.partial`).
         """
@@ -57,7 +57,7 @@ class SequentialGreedy(Checked):
 
 
 class _Steps:
-    """The decided sensors' actions with their reward; -1: not decided."""
+    """The decided sensors' actions with their reward. -1: not decided."""
 
     def __init__(self, cache: RewardCache, partial: Callable[[Ints], Floats]) -> None:
         self.cache, self.partial = cache, partial
@@ -65,7 +65,7 @@ class _Steps:
         self.reward = 0.0
 
     def best(self, sensor: int) -> tuple[float, int] | None:
-        """Return the largest reward with one more sensor, and its action; None if it has no feasible action."""
+        """Return the largest reward with one more sensor, and its action, or None if it has no feasible action."""
         actions = self.cache.actions(self.at, sensor)
         if not actions:
             return None

@@ -23,7 +23,7 @@ Joint = tuple[int, ...]
 def first_best(rewards: Floats) -> int:
     """Return the index of the first of the largest rewards, equal within 1e-9 relative to the largest or to 1.
 
-    In a symmetric layout mirrored actions differ by rounding only; the decision must not depend on that (paper-notes
+    In a symmetric layout mirrored actions differ by rounding only. The decision must not depend on that (paper-notes
     18).
     """
     best = float(rewards.max())
@@ -39,17 +39,17 @@ class JointProblem(NamedTuple):
     """The problem given to a search. An action is the index of one of a sensor's distinct courses, in printed order.
 
     shape: number of distinct courses of each sensor.
-    evaluate: returns mean joint rewards (num,) of joint actions (num, num_sensors), each row one action per sensor; the
+    evaluate: returns mean joint rewards (num,) of joint actions (num, num_sensors), each row one action per sensor. The
         same row gives the same number again, at the same cost.
     independent: the joint action in which every sensor takes its own best feasible course.
-    mask: allowed courses and pairs of courses; None: all.
-    line: returns mean joint rewards (num_courses,) of all courses of a sensor with the others as in a joint action;
+    mask: allowed courses and pairs of courses. None: all.
+    line: returns mean joint rewards (num_courses,) of all courses of a sensor with the others as in a joint action,
         cheaper than their evaluation. None: they are evaluated.
-    ascend: returns the result of a compiled coordinate ascent from a joint action; it respects `mask` if its start
+    ascend: returns the result of a compiled coordinate ascent from a joint action. It respects `mask` if its start
         does. None: the search ascends itself.
     partial: as `evaluate`, with -1 for a sensor that has not decided and is assumed to stay as it is. It accepts any
-        joint action, allowed or not; nothing is kept as evidence. None: not available.
-    bound: returns an upper bound on the mean reward of any joint action; inf if not known. None: not available.
+        joint action, allowed or not. Nothing is kept as evidence. None: not available.
+    bound: returns an upper bound on the mean reward of any joint action, or inf if not known. None: not available.
     late: returns whether the time for the decision is over. A search with rounds or restarts then ends with the best
         action it has found, after one ascent or round at least. None: no time limit.
     """
@@ -70,7 +70,7 @@ class JointSearch(Protocol):
     """A search for a joint action with a large mean reward."""
 
     def search(self, problem: JointProblem, *, rng: np.random.Generator) -> tuple[int, ...]:
-        """Return the joint action to take, one action per sensor; of equally good ones the first in printed order."""
+        """Return the joint action to take, one action per sensor, of equally good ones the first in printed order."""
         ...
 
 
@@ -103,7 +103,7 @@ class RewardCache:
         return self.problem.late is not None and self.problem.late()
 
     def rewards(self, joint_actions: Sequence[Joint]) -> Floats:
-        """Return rewards (num,) of joint actions; those not yet known are evaluated together."""
+        """Return rewards (num,) of joint actions. Those not yet known are evaluated together."""
         new = [joint for joint in dict.fromkeys(joint_actions) if joint not in self.values]
         if new:
             rewards = self.problem.evaluate(np.array(new, np.int64))
@@ -122,7 +122,7 @@ class RewardCache:
         return joint_actions
 
     def actions(self, at: Sequence[int], sensor: int) -> list[int]:
-        """Return the feasible actions of one sensor, given the others in `at`; below 0: not decided yet."""
+        """Return the feasible actions of one sensor, given the others in `at`. Below 0: not decided yet."""
         if self.mask is None:
             return list(range(self.problem.shape[sensor]))
         return np.flatnonzero(self.mask.conflicts(at, sensor) == 0).tolist()
@@ -142,11 +142,11 @@ class RewardCache:
         return joints
 
     def drawn(self, num: int, *, rng: np.random.Generator) -> list[Joint]:
-        """Return `num` joint actions drawn uniformly; those not allowed are replaced by allowed ones near them."""
+        """Return `num` joint actions drawn uniformly. Those not allowed are replaced by allowed ones near them."""
         return self.all_allowed(rng.integers(self.problem.shape, size=(num, len(self.problem.shape))))
 
     def best(self) -> Joint:
-        """Return the best known joint action; of equal ones the first in printed order."""
+        """Return the best known joint action, of equal ones the first in printed order."""
         best = max(self.values.values())
         least = best - tie_tolerance(best)
         return min(joint for joint, value in self.values.items() if value >= least)
@@ -157,7 +157,7 @@ class RewardCache:
 class ExhaustiveSearch(Checked):
     """A search of every joint action (paper, Algorithm 2): the optimum, and the reference for all other searches.
 
-    With a mask only the joint actions that it allows are formed; if there is none, the mask is first relaxed
+    With a mask only the joint actions that it allows are formed. If there is none, the mask is first relaxed
     (`vedette.control.constraints.relaxed`).
 
     Attributes:
@@ -170,12 +170,12 @@ class ExhaustiveSearch(Checked):
     max_joint_actions: Count = 1_000_000
 
     def search(self, problem: JointProblem, *, rng: np.random.Generator) -> tuple[int, ...]:
-        """Return the best joint action; nothing is drawn. Raises `InputError` for more than `max_joint_actions`."""
+        """Return the best joint action. Nothing is drawn. Raises `InputError` for more than `max_joint_actions`."""
         return best_of_all(problem, self.max_joint_actions)
 
 
 def best_of_all(problem: JointProblem, max_actions: int) -> Joint:
-    """Return the best of all allowed joint actions; raises `InputError` for more than `max_actions`."""
+    """Return the best of all allowed joint actions. Raises `InputError` for more than `max_actions`."""
     if problem.mask is None:
         num_joint = math.prod(problem.shape)
         if num_joint > max_actions:

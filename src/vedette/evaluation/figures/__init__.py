@@ -1,6 +1,6 @@
 """The paper's figures, drawn only with Matplotlib objects: no display, no global state.
 
-Every function returns a `matplotlib.figure.Figure`; `save_figure` writes it as PDF, SVG and PNG.
+Every function returns a `matplotlib.figure.Figure`. `save_figure` writes it as PDF, SVG and PNG.
 `write_video` shows a run scan by scan.
 """
 

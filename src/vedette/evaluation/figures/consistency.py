@@ -28,7 +28,7 @@ from vedette.kernels.base.types import Floats
 def consistency_figure(times: Floats, position: Mapping[str, AverageNees]) -> Figure:
     """Return a figure of the average NEES over the runs, divided by its dimension, against time.
 
-    A consistent filter is at 1; 95 % of its scans then lie in the interval, drawn as a band (that of the first
+    A consistent filter is at 1. 95 % of its scans then lie in the interval, drawn as a band (that of the first
     strategy: its width follows from the number of pairs). Above the band, estimates are worse than their covariances.
 
     Args:

@@ -58,7 +58,7 @@ def cost_figure(seconds: Mapping[str, Mapping[str, NDArray[np.floating]]]) -> Fi
 
 
 def _label_times(axes: Axes) -> None:
-    """Set labels that do not overlap: decades, or within two decades 1, 2 and 5; the axis spans at least a decade."""
+    """Set labels that do not overlap: decades, or within two decades 1, 2 and 5. The axis spans at least a decade."""
     low, high = axes.get_xlim()
     if high < 10.0 * low:
         middle = float(np.sqrt(low * high))
@@ -71,6 +71,6 @@ def _label_times(axes: Axes) -> None:
 
 
 def _quantiles(values: NDArray[np.floating]) -> tuple[float, float, float]:
-    """Return 5 %, median and 95 %; three times the median if there are too few values for the others."""
+    """Return 5 %, median and 95 %, or three times the median if there are too few values for the others."""
     low, middle, high = np.quantile(values, (0.05, 0.5, 0.95)).tolist()
     return (low, middle, high) if len(values) >= MIN_FOR_TAILS else (middle, middle, middle)

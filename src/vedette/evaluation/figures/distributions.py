@@ -24,8 +24,8 @@ _GOLDEN = 0.6180339887498949
 def distributions_figure(comparison: Comparison) -> Figure:
     """Return a figure of the mean OSPA of every run, and below it of every paired difference from the first strategy.
 
-    Each dot is a run; of more than `MAX_DOTS` runs, the first are drawn. The box contains the middle half of the runs
-    and its line is their median. The diamond is the mean, in the lower panel with its 95 % confidence interval; if the
+    Each dot is a run. Of more than `MAX_DOTS` runs, the first are drawn. The box contains the middle half of the runs
+    and its line is their median. The diamond is the mean, in the lower panel with its 95 % confidence interval. If the
     interval contains 0, the difference is not significant.
     """
     strategies = comparison.strategies

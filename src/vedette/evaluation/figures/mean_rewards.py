@@ -44,14 +44,14 @@ def mean_rewards_figure(decisions: Sequence[MeanRewards], scene: Scene | None = 
     """Return a figure of the mean reward over the runs of a strategy against action, and how often each was chosen.
 
     One panel for each decision. Independent decisions: one curve for each sensor with a band of one standard error over
-    the runs. Joint decisions: a heat map over the first two sensors with a choice, the maximum over any others; if the
+    the runs. Joint decisions: a heat map over the first two sensors with a choice, the maximum over any others. If the
     joint table was too large to store, curves with the other sensors at their choice. The area of a mark is the share
-    of the runs that chose the action. A sensor with only one action has no curve; of more than six sensors, those whose
+    of the runs that chose the action. A sensor with only one action has no curve. Of more than six sensors, those whose
     choice makes the most difference have one.
 
     Args:
-        decisions: to be shown, in order; `vedette.evaluation.mean_rewards` computes those of runs.
-        scene: names of sensors and reward; None: numbers.
+        decisions: to be shown, in order. `vedette.evaluation.mean_rewards` computes those of runs.
+        scene: names of sensors and reward. None: numbers.
 
     Raises `InputError` for no decision, or none with a choice.
     """

@@ -33,7 +33,7 @@ class SharedInterval:
 
     Attributes:
         members: indices of the curves, increasing.
-        shown: (num_points,) True for the points of the interval; it may have gaps.
+        shown: (num_points,) True for the points of the interval. It may have gaps.
     """
 
     members: tuple[int, ...]
@@ -58,7 +58,7 @@ def shared_intervals(curves: Floats) -> tuple[SharedInterval, ...]:
 
 
 def distinct_points(curves: Floats) -> Bools:
-    """Return True at ends of steps over which a curve equals no other, (num_curves, num_points); all for one."""
+    """Return True at ends of steps over which a curve equals no other, (num_curves, num_points), or all for one."""
     num_curves, num_points = curves.shape
     if num_curves == 1:
         return np.ones((1, num_points), bool)
@@ -128,7 +128,7 @@ def differences_figure(comparison: Comparison) -> Figure:
 
 
 def since_first_decision(comparison: Comparison) -> Bools:
-    """Return True for each scan at or after the first decision, (num_scans,); all if fewer than two are."""
+    """Return True for each scan at or after the first decision, (num_scans,), or all if fewer than two are."""
     shown = comparison.times >= (comparison.decision_times[:1].min(initial=np.inf))
     return shown if shown.sum() >= 2 else np.ones(len(shown), bool)
 
@@ -177,7 +177,7 @@ def _limit_height(axes: Axes, comparison: Comparison, shown: Bools) -> None:
 
 
 def draw_ospa(axes: Axes, comparison: Comparison, part: str) -> None:
-    """Draw one part of the OSPA of every strategy into axes; curves that coincide have dashes of all their colours."""
+    """Draw one part of the OSPA of every strategy into axes. Curves that coincide have dashes of all their colours."""
     times = comparison.times
     curves = [comparison.curve(strategy, part) for strategy in comparison.strategies]
     means = np.array([curve.mean for curve in curves])

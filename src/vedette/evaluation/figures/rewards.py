@@ -35,16 +35,16 @@ _PANEL_WIDTH = 2.4  # inches, within the labels of a column
 def reward_figure(plan: Plan, *, pair: tuple[int, int] | None = None, scene: Scene | None = None) -> Figure:
     """Return a figure of reward against action, one curve for each sensor, with the choice marked.
 
-    Bands are one standard error over the samples. Actions of one column lie at its number, and others side by side;
-    sensors with other columns have separate panels. An independent plan shows its curves unchanged. A joint plan has
-    above them a heat map of the joint table with the chosen actions framed; its curves are the largest reward of each
+    Bands are one standard error over the samples. Actions of one column lie at its number, and others side by side.
+    Sensors with other columns have separate panels. An independent plan shows its curves unchanged. A joint plan has
+    above them a heat map of the joint table with the chosen actions framed. Its curves are the largest reward of each
     of a sensor's actions over the others' actions. With more than two sensors, the heat map is the maximum over the
     sensors outside `pair`. Entries that a search did not evaluate are blank. A sensor with only one action has no
-    curve; of more than six sensors, those whose choice makes the most difference have one.
+    curve. Of more than six sensors, those whose choice makes the most difference have one.
 
     Args:
         plan: with reward tables.
-        pair: the sensors on the axes of the heat map; None: the first two that have a choice.
+        pair: the sensors on the axes of the heat map. None: the first two that have a choice.
         scene: names of sensors and rewards.
 
     Raises `InputError` for a plan without tables (random or fixed control) or without a choice, or a pair that is not
@@ -93,7 +93,7 @@ def sensors_with_choice(decisions: Sequence[tuple[Sequence[RewardTable], Sequenc
 
 
 def first_pair(tables: Sequence[RewardTable], actions: Sequence[Actions]) -> tuple[int, int] | None:
-    """Return the first two sensors with a choice in a joint table; None if there are none."""
+    """Return the first two sensors with a choice in a joint table, or None if there are none."""
     joint = [table.sensors for table in tables if len(table.sensors) > 1]
     with_choice = [sensor for sensors in joint[:1] for sensor in sensors if len(actions[sensor]) > 1]
     return (with_choice[0], with_choice[1]) if len(with_choice) > 1 else None

@@ -39,7 +39,7 @@ def roses_figure(comparison: Comparison, scene: Scene | None = None) -> Figure:
     """Return a figure of the shares of the runs in which each action was chosen, by strategy and decision.
 
     Each row is a strategy that decides, each column a decision. A panel is a rose if every action has a heading or a
-    course; otherwise it has bars of the actions in words. Headings are counter-clockwise from east (0), courses
+    course. Otherwise it has bars of the actions in words. Headings are counter-clockwise from east (0), courses
     clockwise from north (0, upwards). Sensors are side by side within the sector of a heading. The area of a bar of a
     rose is proportional to the share: the radius is proportional to its square root. Sensors that always stand still
     are left out, and more than six are combined. Of many decisions at most six are shown, evenly spread, with the first

@@ -49,14 +49,14 @@ _ZONES: dict[str, dict[str, Any]] = {
 
 @dataclass(frozen=True, slots=True)
 class Scene:
-    """Parts of a scenario that figures show; by default, sensors are numbered and rewards have no name.
+    """Parts of a scenario that figures show. By default, sensors are numbered and rewards have no name.
 
     Attributes:
         names: of the sensors.
-        reward: name of the rewards, with their unit, such as "CS divergence"; empty if unknown.
+        reward: name of the rewards, with their unit, such as "CS divergence", empty if unknown.
         zones: of the plane.
         sensors: for their fields of view.
-        origin: of the plane on the Earth; None if unknown.
+        origin: of the plane on the Earth, or None if unknown.
     """
 
     names: tuple[str, ...] = ()
@@ -70,7 +70,7 @@ class Scene:
         return drawn_text(elided(self.names[sensor], 20)) if self.names else f"sensor {sensor + 1}"
 
     def field(self, sensor: int, pose: Floats) -> FieldOfView | None:
-        """Return the field of view of a sensor at a pose; None if it has no edge or is unknown."""
+        """Return the field of view of a sensor at a pose, or None if it has no edge or is unknown."""
         return bounded_field(self.sensors[sensor], pose) if sensor < len(self.sensors) else None
 
     def reward_title(self, title: str = "Reward") -> str:
@@ -79,7 +79,7 @@ class Scene:
 
     @property
     def corners(self) -> Floats:
-        """Corners of the no-go zones, (num, 2) m; corners beyond the region are moved to its edge."""
+        """Corners of the no-go zones, (num, 2) m. Corners beyond the region are moved to its edge."""
         region_corners = [zone.corners for zone in self.zones if zone.kind == REGION]
         zone_corners = [np.array(zone.corners) for zone in self.zones if zone.kind == NO_GO]
         if not zone_corners or not region_corners:
@@ -144,7 +144,7 @@ def _count_inside(points: Floats, centre: Floats, half: Floats) -> int:
 
 
 def draw_zones(axes: Axes, drawn: Sequence[Zone], scale: float) -> None:
-    """Draw zones into axes, in metres times `scale`; holes are cut out of the zones that precede them."""
+    """Draw zones into axes, in metres times `scale`. Holes are cut out of the zones that precede them."""
     shown: list[tuple[str, list[Path]]] = []
     coast = [scale * np.array(zone.corners) for zone in drawn if zone.kind == COAST]
     style = {"colors": _ZONES[COAST]["edgecolor"], "linewidths": _ZONES[COAST]["linewidth"], "zorder": 1.2}
@@ -169,7 +169,7 @@ def _oriented_ring(corners: Sequence[tuple[float, float]], *, left: bool) -> Flo
 
 
 def bounded_field(sensor: Sensor, pose: Floats | None = None) -> FieldOfView | None:
-    """Return the field of view of a sensor at a pose, or at its start; None if it has no edge."""
+    """Return the field of view of a sensor at a pose, or at its start, or None if it has no edge."""
     field = field_of_view(sensor, None if pose is None else pose.tolist())
     return field if field is not None and np.isfinite(field.reach) else None
 
@@ -182,7 +182,7 @@ def draw_field(axes: Axes, place: tuple[float, float], field: FieldOfView, scale
 
 
 def label_axes(axes: Axes, scale: float, origin: Origin | None) -> None:
-    """Label the axes; with an origin, longitude and latitude are at the other sides.
+    """Label the axes. With an origin, longitude and latitude are at the other sides.
 
     These are exact along lines through the middle of the axes, whose limits must be set before.
     """

@@ -97,7 +97,7 @@ def _without_layout_warnings() -> Iterator[None]:
 
 
 def new_figure(height: float, *, width: float = COLUMN_WIDTH) -> Figure:
-    """Return an empty figure that keeps its labels within its edges; sizes in inches."""
+    """Return an empty figure that keeps its labels within its edges, with sizes in inches."""
     return Figure(figsize=(width, height), layout="constrained")
 
 
@@ -128,7 +128,7 @@ _LABELS = {
 
 
 def strategy_label(name: str) -> str:
-    """Return the name of a planner, a filter or a fusion as papers write it; any other name unchanged."""
+    """Return the name of a planner, a filter or a fusion as papers write it, and any other name unchanged."""
     return _LABELS.get(name, name)
 
 
@@ -148,7 +148,7 @@ def legend_columns(labels: Sequence[str], *, width: float = COLUMN_WIDTH) -> int
 
 
 def span_times(axes: Axes, times: Floats) -> None:
-    """Limit the axis to the first and the last time; a single time gets one second to either side."""
+    """Limit the axis to the first and the last time. A single time gets one second to either side."""
     margin = 0.0 if times[-1] > times[0] else 1.0
     axes.set_xlim(times[0] - margin, times[-1] + margin)
 
@@ -159,7 +159,7 @@ def colour(index: int) -> str:
 
 
 def sensor_styles(sensors: Sequence[int]) -> dict[int, tuple[str, str, Any]]:
-    """Return colour, marker and dashes of each sensor of a figure; those of six sensors all differ.
+    """Return colour, marker and dashes of each sensor of a figure. Those of six sensors all differ.
 
     They are the same in every figure of at most six sensors, and no strategy has one of these colours.
     """
@@ -185,7 +185,7 @@ def line_style(index: int) -> Any:
 
 @styled
 def save_figure(figure: Figure, path: Path | str, *, formats: Sequence[str] = _FORMATS) -> tuple[Path, ...]:
-    """Write a figure once for each format, into one folder; the same figure gives the same bytes.
+    """Write a figure once for each format, into one folder. The same figure gives the same bytes.
 
     Args:
         figure: to be drawn.
@@ -208,7 +208,7 @@ def save_figure(figure: Figure, path: Path | str, *, formats: Sequence[str] = _F
 
 @styled
 def svg_text(figure: Figure) -> str:
-    """Return the figure as the text of an SVG file; the same figure gives the same text."""
+    """Return the figure as the text of an SVG file. The same figure gives the same text."""
     out = io.StringIO()
     with _restored(figure):
         _print(figure, out, "svg")
@@ -217,7 +217,7 @@ def svg_text(figure: Figure) -> str:
 
 @styled
 def png_bytes(figure: Figure, *, dots_per_inch: float) -> bytes:
-    """Return the figure as the bytes of a PNG file, reproducibly; for figures with too many lines for `svg_text`."""
+    """Return the figure as the bytes of a PNG file, reproducibly, for figures with too many lines for `svg_text`."""
     out = io.BytesIO()
     with _restored(figure):
         figure.dpi = dots_per_inch

@@ -45,7 +45,7 @@ def sweep_figure(curves: Sequence[SweepCurve], label: str, unit: str = "m") -> F
     Args:
         curves: one for each strategy.
         label: of the varied number, for the axis.
-        unit: of OSPA; none ("") if it compares whole states.
+        unit: of OSPA, none ("") if it compares whole states.
 
     Raises `InputError` for no curve.
     """

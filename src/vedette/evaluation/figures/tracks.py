@@ -52,12 +52,12 @@ _MAX_NAMED, _MAX_DECISIONS = 8, 12  # largest numbers of sensor names and of dec
 def tracks_figure(*records: RunRecord, titles: Sequence[str] | None = None, scene: Scene | None = None) -> Figure:
     """Return a figure of truth, estimates, sensor paths, decisions and zones in the plane, one panel for each run.
 
-    The axes are equal. With more than eight sensors, names and decisions are left out; so are more than twelve
+    The axes are equal. With more than eight sensors, names and decisions are left out, and so are more than twelve
     decisions.
 
     Args:
         records: one run fills a column, two fill the width of the page.
-        titles: one for each run; by default the strategies.
+        titles: one for each run, by default the strategies.
         scene: the sensors' names, and the zones.
 
     Raises `InputError` for no record, or another number of titles.
@@ -93,7 +93,7 @@ def overview_figure(
     Args:
         record: the run.
         comparison: of all strategies.
-        strategy: of the run; default: the one named as its planner.
+        strategy: of the run. Default: the one named as its planner.
         scene: the sensors' names, and the zones.
 
     Raises `InputError` for a strategy that is not compared.
@@ -136,7 +136,7 @@ def _draw_error(axes: Axes, comparison: Comparison) -> None:
 
 
 def draw_tracks(axes: Axes, record: RunRecord, scale: float, scene: Scene, shade: str = "") -> None:
-    """Draw one run into axes, in metres times `scale`; the estimates in a shade, or coloured by label."""
+    """Draw one run into axes, in metres times `scale`, the estimates in a shade, or coloured by label."""
     draw_zones(axes, scene.zones, scale)
     _draw_truth(axes, record, scale)
     _draw_estimates(axes, record, scale, shade)
@@ -204,7 +204,7 @@ def _draw_estimates(axes: Axes, record: RunRecord, scale: float, shade: str) -> 
 
 
 def labels_recur(labels: Ints) -> bool:
-    """Return True if a label occurs more than once; filters without labels give each estimate another one."""
+    """Return True if a label occurs more than once. Filters without labels give each estimate another one."""
     return len(np.unique(labels, axis=0)) < len(labels)
 
 
@@ -251,7 +251,7 @@ def _draw_field(axes: Axes, row: dict[str, float], pose: Floats, size: float, sc
 
 
 def _direction(row: dict[str, float]) -> Floats:
-    """Return the unit vector of the sensor's chosen direction; 0 if its action is neither a heading nor a step."""
+    """Return the unit vector of the sensor's chosen direction, or 0 if its action is neither a heading nor a step."""
     heading = drawn_angle(row)
     if heading is not None and row.get("distance_m") != 0.0:
         return np.array([np.cos(np.deg2rad(heading)), np.sin(np.deg2rad(heading))])
@@ -264,9 +264,9 @@ def _point(values: Floats) -> tuple[float, float]:
 
 
 def add_legend(figure: Figure, record: RunRecord, scene: Scene, shade: str = "", *, is_video: bool = False) -> None:
-    """Add the legend below the axes; estimates coloured by label have a mark of several colours.
+    """Add the legend below the axes. Estimates coloured by label have a mark of several colours.
 
-    In a video a target has one mark, at its position; measurements have one, and there are no decisions.
+    In a video a target has one mark, at its position. Measurements have one, and there are no decisions.
     """
     open_marker: dict[str, Any] = {"color": INK, "markerfacecolor": "white", "markersize": 4.5, "linewidth": 0.9}
     labels = np.concatenate([estimate.labels for estimate in record.estimates])

@@ -64,18 +64,18 @@ def write_video(
     trust: bool = False,
     progress: Callable[[int, int], None] | None = None,
 ) -> int:
-    """Write a run as a video, whole or not at all; return the number of its frames.
+    """Write a run as a video, whole or not at all, and return the number of its frames.
 
     A frame shows the last scan at its time: true targets (rings) and their paths, estimates by label with their
     ellipses of two standard deviations, sensors with their fields of view and measurements. Measurements are those of
-    `scans_of_record`; they are left out if they are not available.
+    `scans_of_record`. They are left out if they are not available.
 
     Args:
         record: the run.
         scenario: of the run.
         path: a file that ends with .mp4 (written by ffmpeg) or .gif.
         fps: frames per second.
-        seconds: length; None: a fifth of a second for each scan, from two seconds to a minute.
+        seconds: length. None: a fifth of a second for each scan, from two seconds to a minute.
         size: width in pixels.
         trust: run the code that the scenario names, to draw measurements.
         progress: called with the number of every frame drawn, and the number of all frames.
@@ -213,7 +213,7 @@ class _Drawing:
             self._add(self._axes.plot(*position, marker=".", color=shade, markersize=5, zorder=6)[0])
 
     def _draw_names(self, step: int) -> None:
-        """Draw names of sensors, targets and estimates, in this order; a name that would cover another is left out."""
+        """Draw names of sensors, targets and estimates, in this order. A name that would cover another is left out."""
         record, current = self._record, self._record.estimates[step]
         ids, states = record.truth.at(step)
         names = [(self._scene.name(s), pose[:2], INK) for s, pose in enumerate(record.poses[step])]
@@ -261,7 +261,7 @@ class _Drawing:
                 self._draw_scan(scan, section.measurement.kind, pose)
 
     def _draw_scan(self, scan: Scan, kind: str, pose: Floats) -> None:
-        """Draw crosses, rays or circles; measurements of targets in dark ink, clutter in grey."""
+        """Draw crosses, rays or circles: measurements of targets in dark ink, clutter in grey."""
         positions = plane_coordinates(scan.measurements, kind, pose) * (
             1.0 if PLANE_SHAPES[kind] == "ray" else self._scale
         )
@@ -285,7 +285,7 @@ class _Drawing:
 
 
 def _available_scans(record: RunRecord, scenario: Scenario, trust: bool) -> Scans:
-    """Return the scans of a run; empty if they are not available, or need custom code that is not trusted."""
+    """Return the scans of a run, empty if they are not available, or need custom code that is not trusted."""
     if measurement_code(scenario) and not trust:
         return ()
     try:

@@ -25,7 +25,7 @@ def check_parameters(cutoff: float, order: float, *, finite: bool = False) -> No
 
 
 def point_set(values: ArrayLike, name: str) -> Floats:
-    """Return finite points, (num, dim); an empty set may have any shape.
+    """Return finite points, (num, dim). An empty set may have any shape.
 
     Raises `InputError`, with `name`, for anything else.
     """
@@ -40,7 +40,7 @@ def point_set(values: ArrayLike, name: str) -> Floats:
 
 
 def point_sets(estimates: ArrayLike, truths: ArrayLike) -> tuple[Floats, Floats]:
-    """Return both sets as `point_set` does; also raise `InputError` if they differ in dimension."""
+    """Return both sets as `point_set` does, and also raise `InputError` if they differ in dimension."""
     first, second = point_set(estimates, "estimates"), point_set(truths, "truths")
     if first.size and second.size and first.shape[1] != second.shape[1]:
         raise InputError(
@@ -62,7 +62,7 @@ def assign(distances: Floats, order: float) -> tuple[Ints, Ints]:
 
     Args:
         distances: (num_rows, num_columns), finite, at least 0.
-        order: exponent; the cost is the sum of distance ** order, or the largest distance for an infinite order.
+        order: exponent. The cost is the sum of distance ** order, or the largest distance for an infinite order.
     """
     if not distances.size:
         return np.empty(0, np.int64), np.empty(0, np.int64)
@@ -120,11 +120,11 @@ def assign_points(first: Floats, second: Floats, cutoff: float, order: float) ->
 
 
 def power_mean(values: Floats, number: float, order: float) -> float:
-    """Return (sum of values ** order / number) ** (1 / order) without overflow; the largest for an infinite order.
+    """Return (sum of values ** order / number) ** (1 / order) without overflow, or the largest for an infinite order.
 
     Args:
         values: (num,) at least 0.
-        number: divisor of the sum, above 0; at least `num` for a mean, 1 for a root of the sum.
+        number: divisor of the sum, above 0, at least `num` for a mean, 1 for a root of the sum.
         order: exponent, at least 1.
     """
     scale = float(values.max()) if len(values) else 0.0
@@ -138,7 +138,7 @@ def power_mean(values: Floats, number: float, order: float) -> float:
 
 
 def combine(first: float, second: float, order: float) -> float:
-    """Return (first ** order + second ** order) ** (1 / order) without overflow; the larger for an infinite order."""
+    """Return (first ** order + second ** order) ** (1 / order) without overflow, or the larger for infinite order."""
     scale = max(first, second)
     if order == 1.0 and 0.0 < scale < math.inf:
         return scale * (first / scale + second / scale)

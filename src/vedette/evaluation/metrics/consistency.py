@@ -62,8 +62,8 @@ class AverageNees:
     Divided by `dim` it is the ANEES of Li, Zhao and Jilkov (2001), which is 1 if the covariances are correct.
 
     Attributes:
-        mean: (...) average over all pairs of all runs; NaN without pairs.
-        lower, upper: (...) two-sided chi-square interval of the average; NaN without pairs.
+        mean: (...) average over all pairs of all runs, or NaN without pairs.
+        lower, upper: (...) two-sided chi-square interval of the average, or NaN without pairs.
         count: (...) number of pairs.
         dim: degrees of freedom of one pair, and the expected average.
     """
@@ -76,7 +76,7 @@ class AverageNees:
 
     @property
     def consistent(self) -> Bools:
-        """True where the average lies in the interval, (...); False without pairs."""
+        """True where the average lies in the interval, (...), False without pairs."""
         return np.asarray((self.lower <= self.mean) & (self.mean <= self.upper))
 
 
@@ -84,7 +84,7 @@ def average_nees(means: ArrayLike, counts: ArrayLike, *, dim: int, confidence: f
     """Return the NEES averaged over runs, with its interval.
 
     Args:
-        means: (num_runs, ...) mean over the pairs of each run, for example at each scan; NaN without pairs.
+        means: (num_runs, ...) mean over the pairs of each run, for example at each scan, or NaN without pairs.
         counts: (num_runs, ...) number of pairs of each mean.
         dim: dimension of the error: that of the state, or 2 for the position.
         confidence: probability that the average of a consistent filter lies in the interval, above 0 and below 1.
@@ -108,7 +108,7 @@ def average_nees(means: ArrayLike, counts: ArrayLike, *, dim: int, confidence: f
 def nees_interval(counts: ArrayLike, *, dim: int, confidence: float = CONFIDENCE) -> tuple[Floats, Floats]:
     """Return the bounds of the mean of `counts` independent NEES of dimension `dim` with that confidence.
 
-    The sum of the NEES is chi-square distributed with counts * dim degrees of freedom; both tails have the same
+    The sum of the NEES is chi-square distributed with counts * dim degrees of freedom. Both tails have the same
     probability. Returns two arrays in the shape of counts, NaN where it is 0.
     Raises `InputError` for arguments out of range.
     """

@@ -24,7 +24,7 @@ class Matching:
         num_estimates: (num_scans,) number of estimated targets at each scan.
         scans: (num_pairs,) scan of each pair, counted from 0.
         truth_rows: (num_pairs,) row of the pair's target in `Truth.ids` and `Truth.states`.
-        distances: (num_pairs,) distance of the two positions, m; below the cutoff.
+        distances: (num_pairs,) distance of the two positions, m, below the cutoff.
         labels: (num_pairs, 2) label of the estimate.
         means: (num_pairs, state_dim) estimated states.
         covs: (num_pairs, state_dim, state_dim) covariances of the estimates.
@@ -60,13 +60,13 @@ class Matching:
         return self.num_estimates - self.num_matched
 
     def mean_by_scan(self, values: Floats) -> Floats:
-        """Return the mean of (num_pairs,) values over the pairs of each scan, (num_scans,); NaN without pairs."""
+        """Return the mean of (num_pairs,) values over the pairs of each scan, (num_scans,), or NaN without pairs."""
         counts, means = self.num_matched, np.full(self.num_scans, np.nan)
         np.divide(sum_by_scan(self.scans, values, self.num_scans), counts, out=means, where=counts > 0)
         return means
 
     def max_by_scan(self, values: Floats) -> Floats:
-        """Return the largest of (num_pairs,) values over the pairs of each scan, (num_scans,); NaN without pairs."""
+        """Return the largest of (num_pairs,) values over the pairs of each scan, (num_scans,), or NaN without pairs."""
         largest = np.full(self.num_scans, np.nan)
         np.fmax.at(largest, self.scans, values)
         return largest
@@ -80,7 +80,7 @@ def sum_by_scan(scans: Ints, values: Floats, num_scans: int) -> Floats:
 def match_run(truth: Truth, estimates: Sequence[Estimate], *, cutoff: float, order: float) -> Matching:
     """Match estimated with true positions, separately at every scan, by the assignment of OSPA and GOSPA.
 
-    The assignment minimises the sum of min(distance, cutoff) ** order; only pairs closer than the cutoff count. Among
+    The assignment minimises the sum of min(distance, cutoff) ** order. Only pairs closer than the cutoff count. Among
     equally good assignments, always the same one is used.
 
     Args:
@@ -124,7 +124,7 @@ def match_run(truth: Truth, estimates: Sequence[Estimate], *, cutoff: float, ord
 
 
 def _stacked(estimates: Sequence[Estimate]) -> tuple[Ints, Floats, Floats]:
-    """Return the labels, means and covariances of all scans; empty scans may have any state dimension."""
+    """Return the labels, means and covariances of all scans. Empty scans may have any state dimension."""
     non_empty = [estimate for estimate in estimates if estimate.num_targets] or [Estimate.empty(2)]
     dims = {estimate.means.shape[1] for estimate in non_empty}
     if len(dims) > 1:

@@ -32,7 +32,7 @@ class GospaResult:
     """GOSPA distance with alpha = 2, and its costs.
 
     The costs are p-th powers and add up: `localisation + missed + false == total ** p`. (If c ** p exceeds the range of
-    a float, the costs are infinite; the total is still correct.)
+    a float, the costs are infinite. The total is still correct.)
 
     Attributes:
         total: the distance, in the unit of the points.
@@ -53,7 +53,7 @@ class GospaResult:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class GospaSeries:
-    """GOSPA at each scan: (num_scans,) arrays, each as in `GospaResult`; total in m, costs in m ** p."""
+    """GOSPA at each scan: (num_scans,) arrays, each as in `GospaResult`, with total in m, costs in m ** p."""
 
     total: Floats
     localisation: Floats
@@ -72,7 +72,7 @@ def gospa(estimates: ArrayLike, truths: ArrayLike, *, cutoff: float, order: floa
     Args:
         estimates: (num_estimates, point_dim).
         truths: (num_truths, point_dim).
-        cutoff: c > 0, finite; a pair at this distance or more counts as a missed and a false point.
+        cutoff: c > 0, finite. A pair at this distance or more counts as a missed and a false point.
         order: p >= 1, finite.
 
     Raises `InputError` for points that are not finite or of unequal dimension, or a cutoff or order out of range.
@@ -113,7 +113,7 @@ def gospa_distance(
 
 
 def gospa_of_run(truth: Truth, estimates: Sequence[Estimate], *, cutoff: float, order: float) -> GospaSeries:
-    """Return the GOSPA (alpha = 2) of the positions at every scan of a run; raise `InputError` as `match_run` does."""
+    """Return the GOSPA (alpha = 2) of the positions at every scan of a run. Raises `InputError` as `match_run`."""
     return gospa_of_matching(match_run(truth, estimates, cutoff=cutoff, order=order), cutoff, order)
 
 

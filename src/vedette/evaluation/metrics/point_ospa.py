@@ -38,7 +38,7 @@ _DIMENSIONS_DIFFER = "position, as true states have {} components and estimated 
 class OspaResult:
     """OSPA distance and its parts, in the unit of the points.
 
-    For a finite order p, `localisation ** p + cardinality ** p == total ** p`; for an infinite order the total is the
+    For a finite order p, `localisation ** p + cardinality ** p == total ** p`. For an infinite order the total is the
     larger of the two.
 
     Attributes:
@@ -58,11 +58,11 @@ def ospa(estimates: ArrayLike, truths: ArrayLike, *, cutoff: float, order: float
     Args:
         estimates: (num_estimates, point_dim).
         truths: (num_truths, point_dim).
-        cutoff: distance c > 0 at which a matched pair counts as missed; also the cost of an extra or missing point.
+        cutoff: distance c > 0 at which a matched pair counts as missed, also the cost of an extra or missing point.
             May be infinite: then the distance between sets of unequal size is infinite.
-        order: exponent p >= 1; may be infinite.
+        order: exponent p >= 1, which may be infinite.
 
-    Two empty sets are at distance 0; an empty and a non-empty set at `cutoff`.
+    Two empty sets are at distance 0, and an empty and a non-empty set at `cutoff`.
     Raises `InputError` for points that are not finite or of unequal dimension, or a cutoff or order out of range.
     """
     check_parameters(cutoff, order)
@@ -78,13 +78,13 @@ def ospa_of_run(
     Args:
         truth: the targets at every scan.
         estimates: one per scan.
-        cutoff: c > 0, m; without a unit for full states.
+        cutoff: c > 0, m, without a unit for full states.
         order: p >= 1.
         components: "position", the distance in the plane; "position_and_height", the distance in space, for states
             [px, py, vx, vy, pz, vz]; or "state": Euclidean distance over all components, ignoring the units m, m/s and
             rad/s.
 
-    Returns (num_scans, 3): total, localisation and cardinality parts, m; without a unit for full states.
+    Returns (num_scans, 3): total, localisation and cardinality parts, m, without a unit for full states.
     Raises `InputError` as `ospa` does, for other components, and unless there is one estimate per scan.
     """
     check_parameters(cutoff, order)
@@ -118,7 +118,7 @@ def ospa_of_distances(distances: Floats, cutoff: float, order: float) -> OspaRes
     """Return the OSPA of two sets from the distances between their elements.
 
     Args:
-        distances: (num_first, num_second), none above the cutoff; either number may be 0.
+        distances: (num_first, num_second), none above the cutoff. Either number may be 0.
         cutoff: c > 0, in the unit of the distances.
         order: exponent p >= 1.
     """

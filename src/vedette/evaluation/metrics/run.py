@@ -28,8 +28,8 @@ class Metric:
     """A custom metric, with its own column in all tables of metrics.
 
     Attributes:
-        name: name of its column, a Python identifier; it ends with the unit, if any (`_m` m, `_s` s, `_rad` rad).
-        function: function of the record of a run that returns (num_scans,) numbers; NaN where it has no value.
+        name: name of its column, a Python identifier. It ends with the unit, if any (`_m` m, `_s` s, `_rad` rad).
+        function: function of the record of a run that returns (num_scans,) numbers, or NaN where it has no value.
 
     Raises:
         InputError: a name that is not an identifier, or is that of another column.
@@ -68,9 +68,9 @@ class Metric:
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
 class RunMetrics(SummaryRepr):
-    """Metrics of a run at each scan; every array is (num_scans,). OSPA is in the run's record.
+    """Metrics of a run at each scan. Every array is (num_scans,). OSPA is in the run's record.
 
-    With cutoff c and order p, the three GOSPA costs add up to `gospa_m ** p`; their unit is m ** p, metres for p = 1.
+    With cutoff c and order p, the three GOSPA costs add up to `gospa_m ** p`. Their unit is m ** p, metres for p = 1.
     A pair is an estimate and a target matched within c.
 
     Attributes:
@@ -82,10 +82,10 @@ class RunMetrics(SummaryRepr):
         num_false: number of estimates without a partner.
         ospa2_m: OSPA(2) distance over the window that ends at the scan, m.
         cardinality_error: number of estimates minus number of targets.
-        nees_mean: mean NEES of the full state over the pairs; NaN without pairs.
-        nees_count: number of pairs in `nees_mean`; 0 at all scans if estimated and true states differ in dimension.
-        position_nees_mean: mean NEES of the position over all pairs; NaN without pairs.
-        position_nees_max: largest NEES of the position; NaN without pairs.
+        nees_mean: mean NEES of the full state over the pairs, or NaN without pairs.
+        nees_count: number of pairs in `nees_mean`. 0 at all scans if estimated and true states differ in dimension.
+        position_nees_mean: mean NEES of the position over all pairs, or NaN without pairs.
+        position_nees_max: largest NEES of the position, or NaN without pairs.
         label_switches: number of targets matched to another label than at their last match.
         fragmentations: number of targets matched again after a break.
         seconds_to_track: mean time until the targets that appear at the scan are first tracked (`TimeToTrack`).
@@ -115,11 +115,11 @@ class RunMetrics(SummaryRepr):
         return len(self.gospa_m)
 
     def columns(self) -> dict[str, NDArray[np.float64] | NDArray[np.int64]]:
-        """Return the arrays by name, in the order above: float64, or int64 for counts; custom metrics come last."""
+        """Return the arrays by name, in the order above: float64, or int64 for counts. Custom metrics come last."""
         return {**{name: getattr(self, name) for name in COLUMNS}, **self.custom}
 
     def with_custom(self, record: RunRecord, added: Sequence[Metric]) -> RunMetrics:
-        """Return the metrics with custom metrics of the run's record added; those with the same names are replaced.
+        """Return the metrics with custom metrics of the run's record added. Those with the same names are replaced.
 
         Raises `InputError` or `VedetteError` as `Metric.evaluate` does.
         """

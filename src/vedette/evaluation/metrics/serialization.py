@@ -1,4 +1,4 @@
-"""Serialisation of a run's metrics as an Arrow file, stored next to the run; they can be computed again from it."""
+"""Serialisation of a run's metrics as an Arrow file, stored next to the run. They can be computed again from it."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ _LAYOUT = Layout({}, {"": Kind.NUMBER})
 
 
 def encode_metrics(metrics: RunMetrics) -> bytes:
-    """Return the metrics as bytes; equal metrics give equal bytes."""
+    """Return the metrics as bytes. Equal metrics give equal bytes."""
     columns = {name: column.astype(np.float64) for name, column in metrics.columns().items()}
     return write_table(columns, _LAYOUT, {"built_in": _SET, "own": " ".join(metrics.custom)})  # type: ignore[arg-type] # arrays only
 
@@ -35,7 +35,7 @@ def has_metrics(content: bytes, custom: Iterable[str]) -> bool:
 def decode_metrics(content: bytes, num_scans: int) -> tuple[RunMetrics | None, dict[str, Floats]]:
     """Return the metrics from their bytes, and the custom ones among them.
 
-    The metrics are None if another version with other definitions wrote them; the custom ones are returned all the
+    The metrics are None if another version with other definitions wrote them. The custom ones are returned all the
     same.
 
     Raises `InputError` for other bytes, and for metrics of another number of scans.

@@ -24,7 +24,7 @@ class TimeToTrack:
     Attributes:
         cutoff: c > 0, m, finite.
         order: order p >= 1 of the matching, finite.
-        first_scan: targets that appear before this scan do not count; with 2, those present at the first scan.
+        first_scan: targets that appear before this scan do not count. With 2, those present at the first scan.
 
     Raises:
         InputError: an argument out of range.
@@ -39,7 +39,7 @@ class TimeToTrack:
         check_fields(self)
 
     def __call__(self, record: RunRecord) -> Floats:
-        """Return the metric of a run, (num_scans,), s; raise `InputError` as `match_run` does."""
+        """Return the metric of a run, (num_scans,), s. Raise `InputError` as `match_run` does."""
         matching = match_run(record.truth, record.estimates, cutoff=self.cutoff, order=self.order)
         return waiting_times(record.truth, matching, self.first_scan)
 

@@ -1,4 +1,4 @@
-"""OSPA distance between sets of tracks over a sliding window; OSPA(2), because its base distance is itself an OSPA.
+"""OSPA distance between sets of tracks over a sliding window, OSPA(2), because its base distance is itself an OSPA.
 
 M. Beard, B.-T. Vo and B.-N. Vo, "A Solution for Large-Scale Multi-Object Tracking", IEEE Trans. Signal Processing 68,
 2020: the time-averaged OSPA as distance between tracks, and the OSPA between sets of tracks with this base distance.
@@ -25,11 +25,11 @@ _MAX_SHARED_DISTANCES = 2**18
 
 @dataclass(frozen=True, slots=True, eq=False)
 class TrackSet:
-    """Tracks over the same scans; each may begin late, end early and have gaps.
+    """Tracks over the same scans. Each may begin late, end early and have gaps.
 
     Attributes:
         alive: (num_tracks, num_scans) True if the track exists at the scan.
-        positions: (num_tracks, num_scans, dim) in m; finite, without meaning where the track does not exist.
+        positions: (num_tracks, num_scans, dim) in m, finite, without meaning where the track does not exist.
     """
 
     alive: Bools
@@ -91,8 +91,8 @@ def ospa2(estimates: TrackSet, truths: TrackSet, *, cutoff: float, order: float,
         estimates: the estimated tracks.
         truths: the true ones, over the same scans.
         cutoff: c > 0, m, finite.
-        order: exponent p >= 1 of the OSPA between the sets; may be infinite. (The average over time is of order 1.)
-        window: number of scans, at least 1; the first windows are shorter, from the first scan on.
+        order: exponent p >= 1 of the OSPA between the sets. May be infinite. (The average over time is of order 1.)
+        window: number of scans, at least 1. The first windows are shorter, from the first scan on.
 
     Returns (num_scans, 3): total, and the parts from matched tracks and from extra or missing tracks, m.
     Raises `InputError` for arguments out of range, positions that are not finite, or unequal numbers of scans.
@@ -121,7 +121,7 @@ def ospa2(estimates: TrackSet, truths: TrackSet, *, cutoff: float, order: float,
 
 
 def ospa2_of_run(truth: Truth, estimates: Sequence[Estimate], *, cutoff: float, order: float, window: int) -> Floats:
-    """Return the OSPA(2) of the estimated positions, with tracks by label; values and errors as in `ospa2`."""
+    """Return the OSPA(2) of the estimated positions, with tracks by label, with values and errors as in `ospa2`."""
     check_scans(truth, estimates)
     return ospa2(
         TrackSet.from_estimates(estimates), TrackSet.from_truth(truth), cutoff=cutoff, order=order, window=window

@@ -26,7 +26,7 @@ def targets_in_view(
         truth: the targets at every scan.
         poses: (num_scans, num_sensors, pose_dim) poses of the sensors.
         sensors: model of each sensor, in the order of the poses.
-        min_detection_probability: probability of detection, 0 to 1; it counts even if the sensor does not scan at that
+        min_detection_probability: probability of detection, 0 to 1. It counts even if the sensor does not scan at that
             time.
 
     Raises `InputError` for an argument out of range, or another number of sensors than the poses have.
@@ -68,7 +68,7 @@ class TrackedFraction:
         probability("min_detection_probability", self.min_detection_probability)
 
     def __call__(self, record: RunRecord) -> Floats:
-        """Return the share, (num_scans,); raise `InputError` as `match_run` does, and for another number of sensors."""
+        """Return the share, (num_scans,). Raise `InputError` as `match_run` does, and for another number of sensors."""
         truth = record.truth
         in_view = targets_in_view(
             truth, record.poses, self.sensors, min_detection_probability=self.min_detection_probability

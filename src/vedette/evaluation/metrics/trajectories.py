@@ -43,7 +43,7 @@ class Continuity:
 
 
 def continuity_of_run(truth: Truth, estimates: Sequence[Estimate], *, cutoff: float, order: float) -> Continuity:
-    """Return the label switches and fragmentations of a run; raise `InputError` as `match_run` does."""
+    """Return the label switches and fragmentations of a run. Raise `InputError` as `match_run` does."""
     return continuity(truth, match_run(truth, estimates, cutoff=cutoff, order=order))
 
 

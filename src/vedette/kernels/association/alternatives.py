@@ -4,7 +4,7 @@ A label with the rows v of probability p_v takes measurement j, if no other labe
 
     sum over v of p_v w_vj / (1 - sum over v of p_v (1 - sum over options o of w_vo)),
 
-where w_vo are the weights of the options of a row. Versions of a label exclude each other; exclusions between labels of
+where w_vo are the weights of the options of a row. Versions of a label exclude each other. Exclusions between labels of
 one factor are ignored.
 """
 
@@ -38,8 +38,8 @@ class Alternatives(NamedTuple):
 def alternatives_of(options: Options, labels: Ints, presence: Floats) -> Alternatives:
     """Return the options of the labels.
 
-    labels: (num_rows, 2) of the rows; versions of a label are adjacent. presence: (num_rows,) probability of each row
-    in its factor; 1 if absence is one of its options.
+    labels: (num_rows, 2) of the rows. Versions of a label are adjacent. presence: (num_rows,) probability of each row
+    in its factor, or 1 if absence is one of its options.
     """
     num_rows, num_options = len(labels), options.offsets[-1]
     rows, offsets, undetected = np.zeros(num_rows + 1, np.int64), np.zeros(num_rows + 1, np.int64), np.empty(num_rows)

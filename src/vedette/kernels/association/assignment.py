@@ -74,7 +74,7 @@ def make_dual_work(num_rows: int, num_columns: int) -> DualWork:
 
 @borrowing
 def solve_assignment(options: Options, rows: Ints, work: DualWork) -> float:
-    """Return the cost (minus the log weight) of the best joint choice; +inf if none exists.
+    """Return the cost (minus the log weight) of the best joint choice, or +inf if none exists.
 
     Writes the chosen option of each row to `work.row_option` and optimal dual variables u, v <= 0 to `work.row_dual`
     and `work.column_dual`: c - u - v >= 0 for every option, with equality on the optimum (complementary slackness),

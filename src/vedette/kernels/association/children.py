@@ -64,7 +64,7 @@ def is_full(children: Children, num_rows: int) -> bool:
 
 @inlined
 def append_child(children: Children, parent: int, num_rows: int, log_weight: float) -> int:
-    """Append one more child; return the position for its options."""
+    """Append one more child, and return the position for its options."""
     filled = children.filled
     num, start = filled[0], filled[1]
     children.parents[num] = parent

@@ -15,7 +15,7 @@ from vedette.kernels.base.types import Floats, Ints
 
 
 class MarginalWork(NamedTuple):
-    """Working arrays for the clusters of a scan and their sums; made once, grown if a cluster needs more."""
+    """Working arrays for the clusters of a scan and their sums, made once, grown if a cluster needs more."""
 
     leaders: Ints  # (num_rows,) a row of the same cluster, not after this one; the first row is its own leader
     followers: Ints  # (num_rows,) the next row of the same cluster, -1 for none
@@ -71,7 +71,7 @@ def grown_marginal_work(work: MarginalWork) -> MarginalWork:
 
 @borrowing
 def find_clusters(options: Options, work: MarginalWork) -> bool:
-    """Assign each row the first row of its cluster as leader; False if no rows share a gated measurement.
+    """Assign each row the first row of its cluster as leader. Returns False if no rows share a gated measurement.
 
     A cluster consists of rows that share gated measurements, directly or not. Writes leaders, followers and owners
     (union-find, the lesser root leads).
@@ -84,7 +84,7 @@ def find_clusters(options: Options, work: MarginalWork) -> bool:
 
 @borrowing
 def lead_rows(options: Options, leaders: Ints, owners: Ints) -> bool:
-    """Write leaders (num_rows,) and owners (num_measurements,) as in `MarginalWork`; return False if no rows share."""
+    """Write leaders (num_rows,) and owners (num_measurements,) as in `MarginalWork`. Return False if no rows share."""
     shared = False
     for column in range(options.num_measurements):
         owners[column] = -1
@@ -130,7 +130,7 @@ def root_of(leaders: Ints, item: int) -> int:
 
 @inlined
 def gather_cluster(options: Options, leader: int, work: MarginalWork) -> tuple[int, int]:
-    """Write the rows of a cluster and number its measurements, in order; return the numbers of both."""
+    """Write the rows of a cluster and number its measurements, in order, and return the numbers of both."""
     count, num_bits, row = 0, 0, leader
     while row >= 0:
         work.members[count], work.gated_before[count] = row, num_bits

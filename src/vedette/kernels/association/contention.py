@@ -7,7 +7,7 @@ o_g(j), the weight of a row of group h that takes j is multiplied by
 
 The odds depend on the shares of the other measurements of a group, so both are iterated: belief propagation over groups
 and measurements (Williams and Lau 2014). If groups and measurements form no cycle, each group then has its exact
-marginals; only the mutual exclusion of groups is lost. With marginals a_g(j), two groups that meet at one measurement
+marginals. Only the mutual exclusion of groups is lost. With marginals a_g(j), two groups that meet at one measurement
 then have an L1 error of 4 a_1(j) a_2(j), and more groups at most this summed over pairs.
 """
 
@@ -87,7 +87,7 @@ def _write_odds(alone: Alternatives, meetings: Meetings, odds: Floats) -> None:
 
 @borrowing
 def _renew(meetings: Meetings, odds: Floats, totals: Floats) -> float:
-    """Write the messages for the odds; return the largest change. totals: (num_measurements,) summed odds."""
+    """Write the messages for the odds, and return the largest change. totals: (num_measurements,) summed odds."""
     change = 0.0
     for j in range(len(totals)):
         totals[j] = 0.0
@@ -138,7 +138,7 @@ def apply_contention(options: Options, group_of: Ints, alone: Alternatives, comp
     """Multiply the options of rows by the shares of their measurements that other groups leave.
 
     Args:
-        options: written; rows stay in order, heaviest option first.
+        options: written. Rows stay in order, heaviest option first.
         group_of: (num_rows,) group of each row.
         alone: of the same options.
         components: (num_rows + 1,) offsets of the components of each row.

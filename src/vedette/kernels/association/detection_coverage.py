@@ -1,9 +1,9 @@
 """Retention of one hypothesis for every possible association of a label, so that improbable tracks survive a scan.
 
 The heaviest hypotheses are many variations on a few associations. A target whose first measurements fit its birth
-badly starts in a hypothesis far down the list; if it is cut there, it is lost for good, since no later hypothesis holds
+badly starts in a hypothesis far down the list. If it is cut there, it is lost for good, since no later hypothesis holds
 its track. Therefore the heaviest hypothesis of every association is kept as well. An association is a label together
-with its result at the scan: missed, or detected as a given measurement; theta(label) of Vo, Vo, Hoang 2017.
+with its result at the scan: missed, or detected as a given measurement, theta(label) of Vo, Vo, Hoang 2017.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ class Associations(NamedTuple):
 
 @kernel
 def associations_of_options(labels: Ints, options: Options) -> Associations:
-    """Number the associations; options of rows of one label with one measurement share one. labels: (num_rows, 2)."""
+    """Number the associations. Options of rows of one label with one measurement share one. labels: (num_rows, 2)."""
     firsts, num_labels = np.empty(len(labels), np.int64), 0
     numbers, places = np.empty(options.offsets[len(labels)], np.int64), options.num_measurements + 1
     for row in range(len(labels)):
@@ -162,7 +162,7 @@ def mark_heaviest(
     max_log_gap: float,
     marks: Ints,
 ) -> int:
-    """Mark with 1 the heaviest child of each association that the `num_safe` heaviest do not hold; return their number.
+    """Mark with 1 the heaviest child of each association that the `num_safe` heaviest do not hold. Return their number.
 
     At most `most` children, each at most `max_log_gap` below the first. order: the candidate children, heaviest first.
     """

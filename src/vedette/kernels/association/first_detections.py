@@ -131,7 +131,7 @@ class _Chosen(NamedTuple):
 def _chosen(pairs: _Pairs, unclaimed: Floats, least_logit: float, left_out: Floats) -> tuple[_Chosen, float]:
     """Return the candidates, and `log_left_out` of `Candidates`.
 
-    unclaimed: see `log_unclaimed`. left_out: as in `Candidates`, zeros; written.
+    unclaimed: see `log_unclaimed`. left_out: as in `Candidates`, zeros, written.
     """
     num_measurements = len(unclaimed)
     offsets, members = group_members(pairs.measurements, num_measurements)
@@ -178,7 +178,7 @@ def candidates_of(
         sensor: the sensor of the scan.
         log_clutter: (num_measurements,) log clutter intensity at each measurement.
         unclaimed: (num_measurements,) log probability that no track takes each, see `log_unclaimed`. The candidate's
-            odds are rho / kappa times it; exact if only one track may take the measurement.
+            odds are rho / kappa times it, exact if only one track may take the measurement.
         gate: squared Mahalanobis distance beyond which a component does not explain a measurement.
         least_logit: log of the least odds of a candidate.
         label: birth step and index of the candidate of the first measurement.

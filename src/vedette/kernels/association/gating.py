@@ -2,7 +2,7 @@
 
 A gate is an ellipsoid of squared Mahalanobis distance g about the expected measurement, with the innovation covariance
 S: along each axis a its half-width is sqrt(g S_aa). Measurements are sorted along the axis on which gates are smallest
-relative to the spread of the scan; a row considers those between the ends of its gates there, and compares the other
+relative to the spread of the scan. A row considers those between the ends of its gates there, and compares the other
 axes.
 """
 
@@ -122,7 +122,7 @@ def _sort(values: Ints, first: int, last: int) -> None:
 
 @inlined
 def _ends(rows: Rows, row: int, axis: int, periods: Floats, reaches: Floats) -> tuple[float, float]:
-    """Return the interval of the gates of a row on the axis; everything if it may wrap around."""
+    """Return the interval of the gates of a row on the axis, or everything if it may wrap around."""
     low, high = math.inf, -math.inf
     for c in range(rows.offsets[row], rows.offsets[row + 1]):
         low = min(low, rows.innovation.predicted[c, axis] - reaches[c, axis])

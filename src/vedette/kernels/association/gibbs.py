@@ -1,6 +1,6 @@
 """Joint choices drawn by a Gibbs sampler (Vo, Vo, Hoang 2017, Algorithm 1), an alternative to exact ranking.
 
-Each parent's chain starts at its optimal assignment, so the heaviest choice is never missed; a sweep redraws every row
+Each parent's chain starts at its optimal assignment, so the heaviest choice is never missed. A sweep redraws every row
 given the others, and every distinct state is kept once. Samples are divided by the square root of the prior weight.
 """
 
@@ -55,7 +55,7 @@ def _sweep(options: Options, rows: Ints, weights: Floats, work: DualWork, rng: n
 
 @kernel
 def _is_new(choice: Ints, num: int, children: Children, table: Ints) -> bool:
-    """Look the choice up in the hash table of this parent's children; enter it as child `num` if it is new."""
+    """Look the choice up in the hash table of this parent's children, and enter it as child `num` if it is new."""
     mask = len(table) - 1
     key = 0
     for option in choice:

@@ -1,4 +1,4 @@
-"""Share of a hypothesis's joint choices that take no measurement twice; each sum is shared by all hypotheses."""
+"""Share of a hypothesis's joint choices that take no measurement twice. Each sum is shared by all hypotheses."""
 
 from __future__ import annotations
 
@@ -82,7 +82,7 @@ def _components(options: Options) -> Ints:
 
 @borrowing
 def _link(options: Options, rows: Ints, work: TotalWork) -> bool:
-    """Assign places that share a measurement, directly or not, to the first of them; False if there are none."""
+    """Assign places that share a measurement, directly or not, to the first of them. Return False if there are none."""
     found = False
     for i in range(len(rows)):
         work.leaders[i] = i
@@ -111,7 +111,7 @@ def _unlink(options: Options, rows: Ints, work: TotalWork) -> None:
 
 @inlined
 def _number_contested(options: Options, rows: Ints, leader: int, work: TotalWork) -> int:
-    """Number the contested measurements of a cluster; return how many there are."""
+    """Number the contested measurements of a cluster, and return how many there are."""
     num = 0
     for i in range(leader, len(rows)):
         if root_of(work.leaders, i) != leader:
@@ -126,7 +126,7 @@ def _number_contested(options: Options, rows: Ints, leader: int, work: TotalWork
 
 @borrowing
 def _take_row(options: Options, row: int, work: TotalWork, size: int) -> None:
-    """Step of one row in the sum over sets of taken measurements; weights relative to the row's heaviest option."""
+    """Step of one row in the sum over sets of taken measurements, weights relative to the row's heaviest option."""
     start, stop, table, free = options.offsets[row], options.offsets[row + 1], work.table, 0.0
     for option in range(start, stop):
         column, weight = options.columns[option], math.exp(options.log_weights[option] - options.log_weights[start])
@@ -146,7 +146,7 @@ def _take_row(options: Options, row: int, work: TotalWork, size: int) -> None:
 
 @borrowing
 def _log_cluster_share(options: Options, rows: Ints, leader: int, log_totals: Floats, work: TotalWork) -> float:
-    """Return `log_contested_share` of the rows led by `leader`; 0 if there are too many contested measurements."""
+    """Return `log_contested_share` of the rows led by `leader`, or 0 if there are too many contested measurements."""
     size = 1 << min(_number_contested(options, rows, leader, work), MAX_CONTESTED + 1)
     log_bound, scale, is_exact = 0.0, 0.0, size <= len(work.table)
     if is_exact:
@@ -190,7 +190,7 @@ def _is_share_of(work: TotalWork, known: int, num: int) -> bool:
 
 @borrowing
 def _log_known_share(options: Options, num: int, log_totals: Floats, work: TotalWork) -> float:
-    """Return `_log_component_share` of the first `num` rows of `work.members`; computed once for the same rows."""
+    """Return `_log_component_share` of the first `num` rows of `work.members`, computed once for the same rows."""
     key, last = 0, len(work.slots) - 1
     for i in range(num):
         key = hashed(key, work.members[i])

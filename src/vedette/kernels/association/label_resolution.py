@@ -1,11 +1,11 @@
 """Resolution of ambiguous labels: a single label for each target if hypotheses disagree only on labels.
 
-Hypotheses may differ only in labels: {a here, b there} or {b here, a there}; {a here} or {b here}, if one target
+Hypotheses may differ only in labels: {a here, b there} or {b here, a there}, or {a here} or {b here}, if one target
 was born at one of two steps. The marginals of the labels then put either label half at each position, or make neither
 probable. The unlabelled set of targets is the same in all of them, and any labels may be given to it that no two
 targets of one hypothesis share (Svensson, Svensson, Guerriero, Willett 2011, for fixed numbers of targets). Here
 the heaviest hypothesis of a factor keeps its labels. In the others, heaviest first, every target takes the label of the
-target that it most likely is, by the assignment of the least sum of squared distances; a target that is far from all of
+target that it most likely is, by the assignment of the least sum of squared distances. A target that is far from all of
 them opens a new place.
 """
 
@@ -58,7 +58,7 @@ def _make_choice(num: int) -> _Choice:
 
 @borrowing
 def _obvious(hyp_tracks: Ints, labels: Ints, places: _Places, most: float, out: Ints) -> bool:
-    """Return True if each target is nearest to, and near, a different place; `out` then has the places."""
+    """Return True if each target is nearest to, and near, a different place. `out` then has the places."""
     for i in range(len(hyp_tracks)):
         track = hyp_tracks[i]
         place = places.nearest[track]

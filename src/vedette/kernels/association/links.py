@@ -5,8 +5,8 @@ taking it, they have an L1 error in proportion to
 
     the sum over pairs of factors of a_s(j) a_t(j).
 
-For each measurement the weakest associations are cut while this sum over the pairs that are cut stays within a bound;
-all others are linked. `vedette.kernels.association.contention` handles measurements that factors of different groups
+For each measurement the weakest associations are cut while this sum over the pairs that are cut stays within a bound.
+All others are linked. `vedette.kernels.association.contention` handles measurements that factors of different groups
 may still take.
 """
 
@@ -174,7 +174,7 @@ def linked_factors(
 
     alone: of the same options. row_offsets: (num_factors + 1,) rows of each. sizes: (num_factors,) labels of each,
     overwritten. max_cut: at each measurement, bound on the sum over pairs of the products of the cut probabilities.
-    most: largest number of labels of a group; links are made from the strongest on, and left out if they would exceed
+    most: largest number of labels of a group. Links are made from the strongest on, and left out if they would exceed
     it.
     """
     num_factors, num = len(row_offsets) - 1, options.num_measurements

@@ -1,8 +1,8 @@
 """Marginal probability of every option of every row, by clusters of rows that compete for the same measurements.
 
-An LMB filter needs these marginals; an `Association` is another source of them. Within a cluster the sum over all joint
+An LMB filter needs these marginals. An `Association` is another source of them. Within a cluster the sum over all joint
 choices is exact: a forward-backward pass over the rows whose state is the set of measurements already taken. A cluster
-too large for that is summed over its heaviest joint choices, in exact order; the rest is bounded, and no row becomes
+too large for that is summed over its heaviest joint choices, in exact order. The rest is bounded, and no row becomes
 certain because a choice was left out (`vedette.kernels.association.truncation_bound`).
 """
 
@@ -88,10 +88,10 @@ def _single_row(options: Options, row: int, out: Floats) -> float:
 
 @borrowing
 def _transfer(options: Options, row: int, bit_of: Ints, source: Floats, target: Floats, forward: bool) -> None:
-    """Step of one row in the pass over sets of taken measurements; weights relative to the row's heaviest option.
+    """Step of one row in the pass over sets of taken measurements, with weights relative to the row's heaviest option.
 
-    source, target: in the forward pass the sets over the measurements gated before the row, and with those it gates; in
-    the backward pass the other way round.
+    source, target: in the forward pass the sets over the measurements gated before the row, and with those it gates,
+    and in the backward pass the other way round.
     """
     for mask in range(len(target)):
         target[mask] = 0.0
@@ -112,7 +112,7 @@ def _transfer(options: Options, row: int, bit_of: Ints, source: Floats, target: 
 def _exact_cluster(
     options: Options, rows: Ints, bit_of: Ints, gated_before: Ints, tables: Floats, out: Floats
 ) -> float:
-    """Compute marginals of a cluster by forward-backward; return its log total weight, -inf if that underflows.
+    """Compute marginals of a cluster by forward-backward, and return its log total weight, -inf if that underflows.
 
     Before a row, only measurements gated by rows before it can be taken, the first `gated_before` ones.
     """
@@ -191,7 +191,7 @@ def _ranked_cluster(
 
 @borrowing
 def _open_exact(options: Options, rows: Ints, log_total: float, work: MarginalWork, out: Floats) -> bool:
-    """Apply `open_sides` if the exact sum has lost a side to underflow; return False if there is not enough room."""
+    """Apply `open_sides` if the exact sum has lost a side to underflow. Return False if there is not enough room."""
     if not has_closed_side(options, rows, out):
         return True
     work.single[1] = len(rows)
@@ -205,7 +205,7 @@ def _open_exact(options: Options, rows: Ints, log_total: float, work: MarginalWo
 def fill_marginals(
     options: Options, caps: SearchCaps, association: Association | None, work: MarginalWork, out: Floats
 ) -> tuple[MarginalSums, bool]:
-    """Write the log marginal probability of each option into `out`; return False if `work` must be grown for that.
+    """Write the log marginal probability of each option into `out`, and return False if `work` must be grown for that.
 
     If clusters were ranked, 1 minus the retained share of all weight bounds the error of each marginal.
     Inlined because `work` is a large bundle, of which the usual small clusters need little.

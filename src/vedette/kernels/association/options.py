@@ -136,7 +136,7 @@ def sort_row(start: int, stop: int, columns: Ints, log_weights: Floats, entries:
 def weigh_detection(
     rows: Rows, c: int, measurement: Floats, log_clutter: float, sight: Sight, gate: float, entry: int, out: Options
 ) -> float:
-    """Return the log weight of component `c` detected as a measurement, relative to clutter; -inf outside the gate.
+    """Return the log weight of component `c` detected as a measurement, relative to clutter, or -inf outside the gate.
 
     Writes its whitened residual, its updated moments if it bends, and its updated marks, at `entry`.
     """
@@ -199,7 +199,7 @@ def _total_from_peak(values: Floats, start: int, count: int, peak: float) -> flo
 def _fill_options(
     rows: Rows, near: Near, scan: Floats, log_clutter: Floats, sight: Sight, gate: float, out: Options
 ) -> None:
-    """Write the options of every row, heaviest first; options of weight zero are left out."""
+    """Write the options of every row, heaviest first. Options of weight zero are left out."""
     filled, entry, every = 0, 0, len(near.offsets) == 0
     out.offsets[0] = 0
     components = rows.components
@@ -270,7 +270,7 @@ def weighed_options(rows: Rows, scan: ScanInput, sensor: Sensor, caps: Truncatio
 def weighed_options_at(
     rows: Rows, scan: ScanInput, sensor: Sensor, caps: Truncation, log_clutter: Floats
 ) -> tuple[Options, float, int]:
-    """Return the result of `weighed_options`; log_clutter: (num_measurements,) written as in `weigh_options`."""
+    """Return the result of `weighed_options`. log_clutter: (num_measurements,) written as in `weigh_options`."""
     near = near_measurements(rows, scan.measurements, sensor.periods, caps.gate)
     options = _room_for(rows, near, scan.measurements, len(sensor.periods))
     work = make_pair_work(rows.components.means.shape[1], len(sensor.periods))

@@ -50,7 +50,7 @@ def make_rows(num_rows: int, num_components: int, like: Mixture, meas_dim: int) 
 
 @inlined
 def view_rows(rows: Rows, num: int) -> Rows:
-    """Return arrays for `num` rows of one component each; their innovations are not cut."""
+    """Return arrays for `num` rows of one component each. Their innovations are not cut."""
     components = borrowed_components(rows.components, num)
     return Rows(rows.labels[:num], rows.offsets[: num + 1], rows.log_absent[:num], components, rows.innovation)
 
@@ -96,7 +96,7 @@ def fill_births(birth: Lmb, first_row: int, rows: Rows) -> None:
 
 @borrowing
 def expect_rows(sensor: Sensor, scan: ScanInput, rows: Rows, scratch: Scratch) -> None:
-    """Write the expected measurement of every component of the rows for a scan; its measurements are not used.
+    """Write the expected measurement of every component of the rows for a scan. Its measurements are not used.
 
     If these bring noise of their own, each has an update of its own, as for a component over which the sensor bends.
     """
@@ -139,7 +139,7 @@ def rows_of_scan(tracks: Tracks, scan: ScanInput, motion: Motion | None, sensor:
 
 @kernel
 def standing_rows(tracks: Tracks, meas_dim: int) -> Rows:
-    """Return the tracks unchanged as rows: no births, deaths or motion, each surely present; without `expect_rows`."""
+    """Return the tracks unchanged as rows: no births, deaths or motion, each surely present, without `expect_rows`."""
     num = len(tracks.components.log_weights)
     rows = make_rows(len(tracks.labels), num, tracks.components, meas_dim)
     for i in range(len(tracks.labels)):

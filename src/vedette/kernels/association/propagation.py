@@ -5,8 +5,8 @@ measurement j, and w_i0 of all its options without detection,
 
     nu_ij = w_ij / (w_i0 + sum over j' but j of w_ij' mu_ij'),    mu_ij = 1 / (1 + sum over i' but i of nu_i'j),
 
-until mu converges; then P(i is j) is proportional to w_ij mu_ij, and P(i is not detected) to w_i0. The cost of a sweep
-is the number of options, however many rows compete; the iteration always converges, to a unique fixed point.
+until mu converges. Then P(i is j) is proportional to w_ij mu_ij, and P(i is not detected) to w_i0. The cost of a sweep
+is the number of options, however many rows compete. The iteration always converges, to a unique fixed point.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from vedette.kernels.base.types import Floats, Ints
 
 @inlined
 def _sum_of_others(own: float, largest: float, rest: float, is_largest: bool) -> float:
-    """Sum of non-negative terms except one, from the largest and the sum of the rest; any of them may be infinite."""
+    """Sum of non-negative terms except one, from the largest and the sum of the rest. Any of them may be infinite."""
     if is_largest:
         return rest
     # Subtracted before the largest is added: a small sum is not lost next to a large term outside it.
@@ -68,7 +68,7 @@ def _add_up(columns: Ints, to_column: Floats, largest: Floats, rest: Floats, hea
 def _send_to_rows(
     columns: Ints, to_column: Floats, largest: Floats, rest: Floats, heaviest: Ints, to_row: Floats
 ) -> float:
-    """Write mu of every detection into `to_row`; return the largest relative change."""
+    """Write mu of every detection into `to_row`, and return the largest relative change."""
     change = 0.0
     for option in range(len(columns)):
         column = columns[option]
@@ -85,7 +85,7 @@ def _send_to_rows(
 def _conclude(
     offsets: Ints, columns: Ints, log_weights: Floats, weights: Floats, free: Floats, to_row: Floats, out: Floats
 ) -> float:
-    """Write the log marginals; return the rows' part of the log total weight, -inf if a row has no option."""
+    """Write the log marginals, and return the rows' part of the log total weight, -inf if a row has no option."""
     log_total = 0.0
     for row in range(len(offsets) - 1):
         start, stop = offsets[row], offsets[row + 1]
@@ -107,7 +107,7 @@ def _conclude(
 def propagate_beliefs(
     offsets: Ints, columns: Ints, log_weights: Floats, max_sweeps: int, tolerance: float, out: Floats
 ) -> float:
-    """Write the log marginal of every option; return the log total weight in Bethe's approximation, -inf if impossible.
+    """Write the log marginal of every option. Return the log total weight in Bethe's approximation, -inf if impossible.
 
     Options as in `vedette.kernels.association.assignment.Options`. Stops after `max_sweeps`, or when no mu changes by
     more than `tolerance` of itself.

@@ -55,7 +55,7 @@ class Ranking(NamedTuple):
 
 @inlined
 def _next_free(search: Search, columns: Ints, choice: int, last: int, stamp: int) -> int:
-    """Return the first choice from `choice` on, before `last`, whose column is free; -1 for none."""
+    """Return the first choice from `choice` on, before `last`, whose column is free, or -1 for none."""
     while choice < last:
         column = columns[search.options[choice]]
         if column < 0 or search.taken[column] != stamp:
@@ -83,10 +83,10 @@ def _unused_penalty(search: Search, parent: int, stamp: int) -> float:
 
 @inlined
 def _descend(search: Search, node: int, num_rows: int, columns: Ints, limit: float) -> int:
-    """Visit `node` and dive along first choices while no waiting node is better; return a full choice's node, or -1.
+    """Visit `node` and dive along first choices while no waiting node is better. Return a full choice's node, or -1.
 
     A node's bound is its parent hypothesis's optimum plus the extra costs of the choices settled so far. It is a lower
-    bound for all its descendants, since extra costs and penalties are never negative; it is attained by a full choice
+    bound for all its descendants, since extra costs and penalties are never negative. It is attained by a full choice
     that continues with choices of cost 0 and leaves no contended column unused, and for the root by the optimum itself.
     """
     parent = search.parents[node]
@@ -145,7 +145,7 @@ def _write_choice(search: Search, node: int, out: Ints, start: int) -> None:
 
 @borrowing
 def run_search(options: Options, parents: Parents, caps: SearchCaps, search: Search, children: Children) -> bool:
-    """Append children in descending order of weight; False if search or children must be grown to continue.
+    """Append children in descending order of weight. Returns False if search or children must be grown to continue.
 
     At most `max_hypotheses` in total, none more than `max_log_gap` below the first. Called again with the grown arrays,
     the search continues where it stopped.
@@ -223,7 +223,7 @@ def add_missing_groups(
     """Append the best child of each group of parents that has none yet, whatever its weight.
 
     groups: (num_parents,) group of each parent. seen: (num_groups,) working array. Returns False if children must be
-    grown to continue; existing children are not appended again.
+    grown to continue. Existing children are not appended again.
     """
     for group in range(len(seen)):
         seen[group] = 0

@@ -31,7 +31,7 @@ class Search(NamedTuple):
 
     An opened parent has one position per row, in the order in which the search settles them. Choices at a position are
     options, cheapest first, with their extra cost over the row's part in the optimum. If the rows' best options do not
-    collide, these are the rows' own choices, the same for all parents; a parent in whose optimum some rows do not get
+    collide, these are the rows' own choices, the same for all parents. A parent in whose optimum some rows do not get
     their best option has its own choices (reduced costs), and a penalty for each contended column that is left unused.
 
     A node settles the positions of a parent up to `depth`, this one by its choice, those before as in `previous`.

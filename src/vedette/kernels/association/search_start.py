@@ -27,7 +27,7 @@ from vedette.kernels.base.types import Floats, Ints
 
 @borrowing
 def size_search(options: Options, parents: Parents, search: Search) -> bool:
-    """Store the size of the problem; return False if the search must be grown to hold it."""
+    """Store the size of the problem. Return False if the search must be grown to hold it."""
     sizes, num_columns = search.sizes, options.num_measurements
     for k in range(len(sizes)):
         sizes[k] = 0
@@ -87,7 +87,7 @@ def _insert_position(search: Search, first: int, count: int, row: int, gap: floa
 
 @inlined
 def open_free(parent: int, rows: Ints, options: Options, search: Search) -> bool:
-    """Prepare a parent whose rows' best options do not collide; return False if they do."""
+    """Prepare a parent whose rows' best options do not collide. Return False if they do."""
     first_position, gaps = search.sizes[POSITIONS], search.work.row_gap
     search.sizes[STAMP] += 1
     stamp = search.sizes[STAMP]

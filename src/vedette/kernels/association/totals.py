@@ -69,7 +69,7 @@ def log_weight_bound(
         options, parents: of the scan.
         children: those that were found, each once.
         log_totals: of the rows, as in `log_row_totals`.
-        log_next: no choice left out is heavier than this; -inf: none is left out; inf: not known.
+        log_next: no choice left out is heavier than this. -inf: none is left out. inf: not known.
         log_bound: as in `log_total_bound`, for all parents, including those that were cut before.
     """
     num, best = children.filled[0], -math.inf

@@ -45,7 +45,7 @@ def _same_tracks(first: int, second: int, children: Children, columns: Ints) -> 
 
 @kernel
 def merge_equal(children: Children, columns: Ints) -> Ints:
-    """Add the weight of each repeated hypothesis to its first occurrence; return the first occurrences."""
+    """Add the weight of each repeated hypothesis to its first occurrence, and return the first occurrences."""
     num = children.filled[0]
     size = 4
     while size < 2 * num:

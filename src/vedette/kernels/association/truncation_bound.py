@@ -55,7 +55,7 @@ def log_left_out_bound(options: Options, rows: Ints, log_summed: float, log_next
     """Upper bound on the log of the total weight of the joint choices that were not summed.
 
     It is the lesser of two bounds: the weight of all joint choices in which only pairs of rows may not share
-    measurements, minus the weight summed; and the number of joint choices times exp(`log_next`), the largest weight of
+    measurements, minus the weight summed, and the number of joint choices times exp(`log_next`), the largest weight of
     any left out.
     """
     log_all, log_count = _log_uncontested(options, rows, work), 0.0

@@ -29,7 +29,7 @@ LEVELS = {
 
 
 def supports_level(level: str, features: str) -> bool:
-    """Return True if a processor can run code for a level of `LEVELS`; features in LLVM's notation, `+avx,-fma`."""
+    """Return True if a processor can run code for a level of `LEVELS`. Features as LLVM writes them, `+avx,-fma`."""
     return LEVELS[level] <= {feature[1:] for feature in features.split(",") if feature.startswith("+")}
 
 
@@ -44,14 +44,14 @@ def cache_directory() -> Path:
 
 @cache
 def compiler() -> str:
-    """Return the version of the compiler; code of other versions is not used."""
+    """Return the version of the compiler. Code of other versions is not used."""
     checks = os.environ.get("NUMBA_BOUNDSCHECK", "0") not in ("", "0")
     return f"{version('numba')} {version('llvmlite')} {checks}"
 
 
 @cache
 def folder_name(path: Path) -> str:
-    """Return the folder name for a kernel module's code; code of other sources or compilers is in other folders.
+    """Return the folder name for a kernel module's code. Code of other sources or compilers is in other folders.
 
     It does not depend on the location of the sources, so that all environments of a user share compiled kernels.
     """

@@ -99,7 +99,7 @@ class Kernel:
 
     @cached_property
     def part(self) -> PartKernel:
-        """The compiled function that other kernels call; requested during their compilation."""
+        """The compiled function that other kernels call, requested during their compilation."""
         return _dispatchers().PartKernel(self.py_func, targetoptions=self._options | _AS_PART)
 
     @property
@@ -155,7 +155,7 @@ class ModelFunction:
         note_source(function)
 
     def __call__(self, *args: Any) -> Any:
-        """Call the function from Python; read-only arrays, such as those of densities, are copied."""
+        """Call the function from Python. Read-only arrays, such as those of densities, are copied."""
         if not hasattr(self, "c_address"):
             self.bind()
         return self.dispatcher(*map(_writeable, args))
@@ -166,14 +166,14 @@ class ModelFunction:
         return _dispatchers().ModelDispatcher.of_model(self, dict(_OPTIONS))
 
     def __getattr__(self, name: str) -> Any:
-        """Compile the function when its type is first read; a property would be called again at every kernel call."""
+        """Compile the function when its type is first read. A property would be called again at every kernel call."""
         if name != "_numba_type_":
             raise AttributeError(f"{type(self).__name__!r} object has no attribute {name!r}")
         self.bind()
         return self.__dict__[name]
 
     def bind(self) -> None:
-        """Compile to the signature of the kind, and store the addresses of the machine code; thread-safe."""
+        """Compile to the signature of the kind, and store the addresses of the machine code, thread-safe."""
         with _MAKING:
             dispatcher = self.dispatcher
         self.c_address, self.jit_address, found = _dispatchers().addresses_of(dispatcher)

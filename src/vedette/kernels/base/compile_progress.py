@@ -23,7 +23,7 @@ Listener = Callable[[CompileProgress | None], None]
 
 
 class _Watch:
-    """Counts the functions of the kernel that is compiled, and notifies the listener; None when a kernel is done."""
+    """Counts the functions of the compiled kernel, and notifies the listener, with None when a kernel is done."""
 
     def __init__(self, listener: Listener) -> None:
         self._tell = listener

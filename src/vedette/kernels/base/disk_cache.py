@@ -39,7 +39,7 @@ class _PackageLocator:
         self._line = function.__code__.co_firstlineno
 
     def ensure_cache_path(self) -> None:
-        """Create the folder if possible; otherwise installed kernels can still be read."""
+        """Create the folder if possible. Otherwise installed kernels can still be read."""
         with contextlib.suppress(OSError):
             make_private_folder(Path(self.get_cache_path()))
 
@@ -78,7 +78,7 @@ class _Place:
         return signature, (triple, self._level, ""), code
 
     def is_safe(self, source: Path) -> bool:
-        """Return True if the folder exists and no other user can write to it; warn once if others can."""
+        """Return True if the folder exists and no other user can write to it, and warn once if others can."""
         try:
             fault = _fault_of(self.folder.resolve(), source)
         except (OSError, RuntimeError):
@@ -92,7 +92,7 @@ class _EntryFile:
     """Entries of one function, each in a file of its own that is named by its key.
 
     Numba's own class keeps an index of numbered files: if two processes compile at once, an entry is lost or stored
-    under the other's key. Here every file is complete and identifies itself; the last of equal writers wins.
+    under the other's key. Here every file is complete and identifies itself. The last of equal writers wins.
     """
 
     def __init__(self, places: list[_Place], filename_base: str, source_stamp: str, source: Path) -> None:
@@ -117,7 +117,7 @@ class _EntryFile:
                 partial.unlink(missing_ok=True)
 
     def load(self, key: Any) -> Any:
-        """Return the entry; None if it is missing, damaged, of other sources, or writable by other users."""
+        """Return the entry, or None if it is missing, damaged, of other sources, or writable by other users."""
         for place in self._places:
             if place.serves(key) and place.is_safe(self._source):
                 found = self._load(self._path(place, key), place.key(key))

@@ -1,4 +1,4 @@
-"""Dispatchers that compile kernels and model functions, and call them from Python; the only module that needs Numba.
+"""Dispatchers that compile kernels and model functions, and call them from Python, the only module that needs Numba.
 
 Imported when the first of them is called, compiled or read from disk.
 """
@@ -72,7 +72,7 @@ def _is_read_only(kind: Any) -> bool:
 
 
 class WholeKernel(CPUDispatcher):  # type: ignore[misc]
-    """Kernel function with everything that it reaches, as Python calls it; cached on disk."""
+    """Kernel function with everything that it reaches, as Python calls it, cached on disk."""
 
     # Function that names the plain tuples that it returns; None if there are none to name.
     name: Callable[[Any], Any] | None = None
@@ -97,7 +97,7 @@ class WholeKernel(CPUDispatcher):  # type: ignore[misc]
             return super().compile(sig)
 
     def add_overload(self, cres: Any) -> None:
-        """Add code that was compiled or read from disk; everything that a call needs is set before it can be called."""
+        """Add code that was compiled or read from disk. Everything that a call needs is set before it can be called."""
         for environment in cres._find_referenced_environments():  # includes those of the parts
             self.targetctx.codegen().set_env(environment.env_name, environment)
         shape = shape_of(cres.signature.return_type)
@@ -107,7 +107,7 @@ class WholeKernel(CPUDispatcher):  # type: ignore[misc]
         super().add_overload(cres)
 
     def typeof_pyval(self, value: Any) -> Any:
-        """Return the type of an argument that Numba's fast path does not support; called by its dispatcher.
+        """Return the type of an argument that Numba's fast path does not support, called by its dispatcher.
 
         Numba's own method registers a bundle's type as in use, which hashes the types of all its fields.
         """
@@ -134,7 +134,7 @@ class ModelDispatcher(WholeKernel):
 
     @classmethod
     def _rebuild(cls, kind: str, **states: Any) -> ModelDispatcher:
-        """Restore from a pickle in another process; locked, so that no other thread sees it incomplete."""
+        """Restore from a pickle in another process, locked, so that no other thread sees it incomplete."""
         with global_compiler_lock:
             dispatcher: ModelDispatcher = super()._rebuild(**states)
             if not hasattr(dispatcher, "model"):
@@ -144,7 +144,7 @@ class ModelDispatcher(WholeKernel):
 
 
 def addresses_of(dispatcher: ModelDispatcher) -> tuple[int, int, Any]:
-    """Compile a model function; return its addresses for C and for kernels, and its Numba type."""
+    """Compile a model function, and return its addresses for C and for kernels, and its Numba type."""
     # Numba's own lock: a thread that compiles a kernel holds it while it asks for the types of functions.
     with global_compiler_lock:
         args, result = normalize_signature(SIGNATURES[dispatcher.model.kind][1])

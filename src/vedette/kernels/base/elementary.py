@@ -113,7 +113,7 @@ def logs_of_one_and(values: Floats, work: Bits, more: Bits) -> None:
 
 @borrowing
 def logs(values: Floats, work: Bits, more: Bits) -> None:
-    """Set values = log(values), for finite values above 1e-300; NaN for values that are not positive."""
+    """Set values = log(values), for finite values above 1e-300, or NaN for values that are not positive."""
     numbers, num = work.numbers, values.shape[0]
     for s in range(num):
         numbers[s] = values[s]
@@ -126,7 +126,7 @@ def logs(values: Floats, work: Bits, more: Bits) -> None:
 
 @borrowing
 def directions(y: Floats, x: Floats, out: Floats) -> None:
-    """Set out = atan2(y, x) for finite numbers, in [-pi, pi]; 0 if both are 0.
+    """Set out = atan2(y, x) for finite numbers, in [-pi, pi], or 0 if both are 0.
 
     With the coefficients of fdlibm (s_atan.c). The arc tangent of the quotient t of the smaller by the larger is
     atan(c) + atan((t - c) / (1 + c t)), with c the one of 0, 1/2 and 1 that leaves the smallest remainder.

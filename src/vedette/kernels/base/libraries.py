@@ -79,7 +79,7 @@ class WholeLibrary(JITCodeLibrary):  # type: ignore[misc]
         super()._optimize_final_module()
 
     def serialize_using_object_code(self) -> tuple[str, str, Any]:
-        """Return machine code and the names that it defines; the source is not needed, as nothing links a whole."""
+        """Return machine code and the names that it defines. The source is not needed, as nothing links a whole."""
         self._ensure_finalized()
         module = self._final_module
         items = (*module.functions, *module.global_variables)

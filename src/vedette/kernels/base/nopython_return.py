@@ -43,7 +43,7 @@ _BOXERS = {types.Array: _box_array, **dict.fromkeys(NAMED, box_tuple)}
 
 @contextmanager
 def returned_without_python() -> Iterator[None]:
-    """Context manager in which code is compiled with this boxing; the caller must hold the compiler's lock."""
+    """Context manager in which code is compiled with this boxing. The caller must hold the compiler's lock."""
     before = {kind: _boxers.functions[kind] for kind in _BOXERS}
     _boxers.functions.update(_BOXERS)
     try:

@@ -23,7 +23,7 @@ def make_private_folder(folder: Path) -> None:
 
 
 def folder_fault(folder: Path, source: Path) -> str | None:
-    """Return why other users can write into the folder or replace it, checking from the top; None if they cannot.
+    """Return why other users can write into the folder or replace it, checking from the top, or None if they cannot.
 
     folder: resolved, without links. source: file whose owner is trusted. Raises `OSError` if one does not exist.
     """
@@ -42,7 +42,7 @@ def folder_fault(folder: Path, source: Path) -> str | None:
 
 
 def read_private(path: Path, source: Path) -> bytes | None:
-    """Return the content of a file; None if it does not exist or other users can have written it."""
+    """Return the content of a file, or None if it does not exist or other users can have written it."""
     try:
         with path.open("rb") as file:
             if _OWNED:

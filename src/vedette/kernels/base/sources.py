@@ -39,7 +39,7 @@ def _content(path: Path) -> bytes:
 
 @cache
 def package_file(name: str) -> Path | None:
-    """Return the file of this package that a code object names; None for one from elsewhere."""
+    """Return the file of this package that a code object names, or None for one from elsewhere."""
     path = Path(name).resolve()
     return path if path.is_relative_to(PACKAGE_ROOT) else None
 
@@ -53,7 +53,7 @@ def note_source(function: Callable[..., Any]) -> None:
 
 @cache
 def _kernel_imports(path: Path) -> frozenset[Path]:
-    """Return the modules of kernels and models that a file imports; extra ones would be harmless."""
+    """Return the modules of kernels and models that a file imports. Extra ones would be harmless."""
     found: set[Path] = set()
     for module, names in _IMPORT.findall(_content(path).decode()):
         named = (module, *(f"{module}.{name}" for name in re.findall(r"\w+", names)))

@@ -21,7 +21,7 @@ HEIGHT = 4  # index in a state [px, py, vx, vy, pz, vz] of the height, m, where 
 
 
 class Marks(NamedTuple):
-    """Optional columns of Gaussian components; a column that is not in use has no width.
+    """Optional columns of Gaussian components. A column that is not in use has no width.
 
     All functions that depend on the columns are in `vedette.kernels.gaussian.marks`, so that a new column is added only
     here and there.
@@ -48,7 +48,7 @@ class Tracks(NamedTuple):
 
 
 class Glmb(NamedTuple):
-    """GLMB density: hypotheses over one shared track table (Vo, Vo, Hoang 2017, eq. 12; paper eq. 4)."""
+    """GLMB density: hypotheses over one shared track table (Vo, Vo, Hoang 2017, eq. 12, paper eq. 4)."""
 
     tracks: Tracks
     hyp_offsets: Ints  # (num_hyps + 1,) into hyp_tracks

@@ -1,7 +1,7 @@
 """Position of a target when the turning beam of a radar passes it, and derivatives of the measurement at that time.
 
 A scan of a turning radar is one turn, and its time is the middle of the turn. The beam passes a target up to half a
-turn earlier or later; target and radar have constant velocity in between. The pose of such a scan holds the velocity of
+turn earlier or later. Target and radar have constant velocity in between. The pose of such a scan holds the velocity of
 the radar in components 6 and 7 (m/s), the bearing of the beam in the middle of the turn in component 8 (rad), and the
 turn rate in component 9 (rad/s, counter-clockwise positive). With a shorter pose or a turn rate of 0, all measurements
 of the scan have one time.
@@ -23,7 +23,7 @@ class Passage(NamedTuple):
     """A target at the time when the beam passes it.
 
     dx, dy: offset from the sensor, m. vx, vy: velocity relative to the sensor, m/s. lag: that time, s after the time of
-    the scan; 0 if all measurements have one time.
+    the scan, or 0 if all measurements have one time.
     """
 
     dx: float
@@ -67,7 +67,7 @@ def _passage(state: Floats, pose: Floats) -> Passage:
 
 @inlined
 def passage(state: Floats, pose: Floats) -> Passage:
-    """Return the target at its passage; at the scan time, with velocity 0, if the sensor does not turn."""
+    """Return the target at its passage, or at the scan time, with velocity 0, if the sensor does not turn."""
     if turns(pose):
         return _passage(state, pose)
     return Passage(state[0] - pose[0], state[1] - pose[1], 0.0, 0.0, 0.0)
@@ -106,7 +106,7 @@ def to_scan_time(at: Passage, pose: Floats, moves_with_target: bool, climb: floa
     and the offset by dp + lag dv + v d lag.
 
     at: the passage. moves_with_target: True if the measurement is the target's position, False if it depends on the
-    offset from the sensor. climb: vertical velocity where the measurement depends on a height, m/s; else 0.
+    offset from the sensor. climb: vertical velocity where the measurement depends on a height, m/s, else 0.
     """
     square = at.dx * at.dx + at.dy * at.dy
     if at.lag == 0.0 or square == 0.0:

@@ -47,7 +47,7 @@ def copy_gaussian(means: Floats, covs: Floats, source: int, out_means: Floats, o
 
 @inlined
 def copy_component(mixture: Mixture, source: int, out: Mixture, target: int) -> None:
-    """Copy component `source` to place `target`; without the marks for which `out` has no column."""
+    """Copy component `source` to place `target`, without the marks for which `out` has no column."""
     out.log_weights[target] = mixture.log_weights[source]
     copy_gaussian(mixture.means, mixture.covs, source, out.means, out.covs, target)
     copy_marks(mixture.marks, source, out.marks, target)
@@ -55,7 +55,7 @@ def copy_component(mixture: Mixture, source: int, out: Mixture, target: int) -> 
 
 @inlined
 def copy_components(mixture: Mixture, first: int, last: int, out: Mixture, start: int) -> int:
-    """Copy components `first:last` to the places from `start` on; the end of what is filled."""
+    """Copy components `first:last` to the places from `start` on. Returns the end of what is filled."""
     for c in range(first, last):
         copy_component(mixture, c, out, start + c - first)
     return start + last - first
@@ -70,7 +70,7 @@ def components_between(mixture: Mixture, first: int, last: int) -> Mixture:
 
 @inlined
 def borrowed_components(mixture: Mixture, num: int) -> Mixture:
-    """The first `num` components, as views for kernels that only borrow arrays; their marks are not cut."""
+    """The first `num` components, as views for kernels that only borrow arrays. Their marks are not cut."""
     return Mixture(mixture.log_weights[:num], mixture.means[:num], mixture.covs[:num], mixture.marks)
 
 
@@ -85,7 +85,7 @@ def own_components(mixture: Mixture, num: int) -> Mixture:
 
 @kernel
 def grown_components(mixture: Mixture, filled: int, needed: int) -> Mixture:
-    """The first `filled` components with room for at least `needed`; the same bundle where there is room already."""
+    """The first `filled` components with room for at least `needed`, or the same bundle where there is room already."""
     room = len(mixture.log_weights)
     if needed <= room:
         return mixture
@@ -108,7 +108,7 @@ def stacked_mixtures(first: Mixture, second: Mixture) -> Mixture:
 def merge_components(mixture: Mixture, chosen: Ints, weights: Floats, count: int, out: Mixture, target: int) -> None:
     """Write the moments and merged marks of the first `count` of `chosen` as one component.
 
-    See `match_components`; its weight is not written.
+    See `match_components`. Its weight is not written.
     """
     match_components(chosen, weights, count, mixture.means, mixture.covs, out.means[target], out.covs[target])
     merge_marks(mixture.marks, chosen, weights, count, out.marks, target)
@@ -128,7 +128,7 @@ def merge_all(
 
 
 def components_of(log_weights: Floats, means: Floats, covs: Floats, marks: Marks | None = None) -> Mixture:
-    """New components of these weights, moments and marks; None: no column in use."""
+    """New components of these weights, moments and marks. None: no column in use."""
     return Mixture(log_weights, means, covs, unmarked(len(log_weights)) if marks is None else marks)
 
 

@@ -31,7 +31,7 @@ def checked(detection: float) -> float:
 def _at(
     sensor: Sensor, pose: Floats, mean: Floats, root: tuple[float, float, float], u: float, v: float, state: Floats
 ) -> float:
-    """P_D at standard deviates of the position; the rest of the state must stand in `state`."""
+    """P_D at standard deviates of the position. The rest of the state must stand in `state`."""
     state[0] = mean[0] + root[0] * u
     state[1] = mean[1] + root[1] * u + root[2] * v
     return checked(sensor.prob_detection(state, pose, sensor.detection_params))
@@ -51,7 +51,7 @@ def _over_nodes(
 ) -> tuple[float, float]:
     """Mean of P_D over a Gaussian, and the largest difference of P_D between its nodes.
 
-    The sum of weight * P_D at mean + L (standard deviates), L L' the covariance of the position; the rest of the state
+    The sum of weight * P_D at mean + L (standard deviates), L L' the covariance of the position. The rest of the state
     stays at its mean. With a stride above 1 the sum is incomplete where P_D is the same at every stride-th node.
     """
     nodes, total, root = sensor.detection_nodes, 0.0, root_of_position(cov)
@@ -73,7 +73,7 @@ def detection_and_edge(sensor: Sensor, pose: Floats, mean: Floats, cov: Floats, 
     """Return the detection probability of a Gaussian, and True if an edge of the field of view passes through it.
 
     `sensor.detection_rule` selects P_D at the mean, or its mean over the Gaussian in closed form or by nodes. With
-    AT_EDGES it is the mean by nodes where P_D differs between nodes, and P_D at the mean elsewhere; only this rule
+    AT_EDGES it is the mean by nodes where P_D differs between nodes, and P_D at the mean elsewhere. Only this rule
     reports edges. state: (state_dim,) to be written.
     """
     if sensor.detection_rule == CLOSED_FORM:

@@ -87,7 +87,7 @@ def _candidates(means: Floats, covs: Floats, other_means: Floats, other_covs: Fl
 def _distance(
     mean: Floats, cov: Floats, other_mean: Floats, other_cov: Floats, total: Floats, factor: Floats, offset: Floats
 ) -> tuple[float, float]:
-    """Return d'S^-1 d and log det S, infinite if S is not positive definite; the last three are working arrays."""
+    """Return d'S^-1 d and log det S, infinite if S is not positive definite. The last three are working arrays."""
     for i in range(len(mean)):
         offset[i] = mean[i] - other_mean[i]
         for j in range(len(mean)):

@@ -37,7 +37,7 @@ def _rotate(matrix: Floats, vectors: Floats, p: int, q: int) -> None:
 def diagonalise(matrix: Floats, vectors: Floats) -> None:
     """Eigenvalues of a symmetric matrix, on its diagonal, and its eigenvectors, the columns of `vectors`.
 
-    By cyclic Jacobi rotations; `matrix` is used up. A diagonal matrix is left as it is.
+    By cyclic Jacobi rotations. `matrix` is used up. A diagonal matrix is left as it is.
     """
     n = matrix.shape[0]
     for i in range(n):
@@ -57,7 +57,7 @@ def diagonalise(matrix: Floats, vectors: Floats) -> None:
 
 @borrowing
 def clip_negative(matrix: Floats, rotated: Floats, vectors: Floats) -> None:
-    """Set the negative eigenvalues of a symmetric matrix to 0; one without any is left as it is.
+    """Set the negative eigenvalues of a symmetric matrix to 0. One without any is left as it is.
 
     rotated, vectors: of the same shape, working arrays.
     """

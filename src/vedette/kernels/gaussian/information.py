@@ -38,7 +38,7 @@ def to_information(
 ) -> bool:
     """Information row of N(mean, cov)^power about `reference`, into `row`. False where `cov` is not positive definite.
 
-    factor, inverse: (dim, dim) working arrays; they hold the Cholesky factor L and L^-1 afterwards.
+    factor, inverse: (dim, dim) working arrays. They hold the Cholesky factor L and L^-1 afterwards.
     """
     n = mean.shape[0]
     if not cholesky(cov, factor):
@@ -73,7 +73,7 @@ def to_information(
 
 @inlined
 def log_integral(row: Floats, dim: int) -> float:
-    """Return the log integral of `row` over all states; NaN if its Y is not positive definite.
+    """Return the log integral of `row` over all states, or NaN if its Y is not positive definite.
 
     `row` is used up: afterwards it holds the elimination, with the pivots of Y and s - y'Y^-1 y on its diagonal.
     """

@@ -89,7 +89,7 @@ def copy_innovation(innovation: Innovation, source: int, out: Innovation, target
 def _expect_sigma_points(
     sensor: Sensor, pose: Floats, mean: Floats, cov: Floats, predicted: Floats, cross: Floats, scratch: Scratch
 ) -> PointWeights:
-    """Predicted measurement, innovation covariance without noise, and cross; the images are left as deviations."""
+    """Predicted measurement, innovation covariance without noise, and cross. The images are left as deviations."""
     n, m = mean.shape[0], predicted.shape[0]
     points, images = scratch.points, scratch.images
     weights = fill_sigma_points(sensor.method, mean, cov, points, scratch.factor)
@@ -149,7 +149,7 @@ def _has_volume(noise: Floats, factor: Floats, work: Floats, m: int) -> bool:
 def condition(
     cov: Floats, noise: Floats, innovation: Floats, factor: Floats, cross: Floats, posterior: Floats, n: int, m: int
 ) -> bool:
-    """Add the noise to `innovation` and factor it; whiten `cross`; posterior = cov - cross' cross.
+    """Add the noise to `innovation` and factor it, whiten `cross`. Then posterior = cov - cross' cross.
 
     False where that difference cancels so much that it must be taken by `posterior_of_squares`.
     """
@@ -208,7 +208,7 @@ def bends_over(pose: Floats, mean: Floats, cov: Floats, jacobian: Floats, noise:
     """Return True if the second-order error of a component exceeds `LARGEST_BEND` standard deviations of its noise.
 
     A measurement of a position at distance d has second derivatives of about |H| / d. Over a position of variance V,
-    both axes together, component a is then off by |H_a| V / (2 d), which is the sagitta V / (2 d) of a range; and by
+    both axes together, component a is then off by |H_a| V / (2 d), which is the sagitta V / (2 d) of a range, and by
     |H_aj| sqrt(V P_jj) / d with another component j of the state. A height that is measured is part of the position.
     """
     dx, dy, variance = mean[0] - pose[0], mean[1] - pose[1], cov[0, 0] + cov[1, 1]
@@ -271,7 +271,7 @@ def log_norm_of_factor(factor: Floats) -> float:
 
 @inlined
 def expect(sensor: Sensor, pose: Floats, mean: Floats, cov: Floats, at: int, out: Innovation, scratch: Scratch) -> None:
-    """Fill entry `at` of `out`; noise is taken at the predicted mean (paper-notes 3), detection as the sensor says."""
+    """Fill entry `at` of `out`. Noise is taken at the predicted mean (paper-notes 3), detection as the sensor says."""
     expect_measurement(sensor, pose, mean, cov, out.predicted[at], at, out, scratch)
     out.prob_detection[at], out.at_edge[at] = detection_and_edge(sensor, pose, mean, cov, scratch.points[0])
 
@@ -315,7 +315,7 @@ def expect_measurement(
 
 @inlined
 def whiten(innovation: Innovation, at: int, measurement: Floats, periods: Floats, gate: float, out: Floats) -> float:
-    """Whitened residual of a measurement against component `at`; returns its squared Mahalanobis distance.
+    """Whitened residual of a measurement against component `at`. Returns its squared Mahalanobis distance.
 
     Once that is known to be above `gate` the rest is left undone and a lower bound of it is returned.
     """

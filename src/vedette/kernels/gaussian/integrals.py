@@ -21,7 +21,7 @@ _LARGEST_EXPONENT = 400.0
 
 
 class Integrals(NamedTuple):
-    """Integrals factor * exp(exponent): without a logarithm; the factor is within 1e-125 and 1e125."""
+    """Integrals factor * exp(exponent): without a logarithm. The factor is within 1e-125 and 1e125."""
 
     factors: Floats  # (num,) NaN where the integral is none
     exponents: Floats  # (num,)
@@ -37,7 +37,7 @@ def make_integrals(num: int) -> Integrals:
 
 @inlined
 def _eliminate(rows: Floats, dim: int, out: Integrals) -> None:
-    """Eliminate all rows as in `information.log_integral`; write the inverse product of the pivots to the factors."""
+    """Eliminate all rows as in `information.log_integral`. Write the inverse product of the pivots to the factors."""
     product, inverses, num, diagonal = out.factors, out.inverses, rows.shape[1], 0
     for s in range(num):
         product[s] = 1.0
@@ -71,7 +71,7 @@ def _take_logs(rows: Floats, dim: int, out: Integrals) -> None:
 
 @borrowing
 def integrate_rows(rows: Floats, dim: int, out: Integrals) -> None:
-    """Write the integrals of rows (row_size(dim), num) over all states; NaN if Y is not positive definite.
+    """Write the integrals of rows (row_size(dim), num) over all states, or NaN if Y is not positive definite.
 
     `rows` are used up: entry (dim + 1) (dim + 2) / 2 - 1 of each holds s - y'Y^-1 y afterwards.
     """

@@ -53,7 +53,7 @@ def moved(intensity: Mixture, motion: Motion, dt: float) -> Mixture:
 def _divergence(
     mixture: Mixture, c: int, heaviest: int, inverse: Floats, log_det: float, reach: float, factor: Floats
 ) -> float:
-    """Twice the Kullback-Leibler divergence of component `c` from `heaviest`; inf once it is known to be above reach.
+    """Twice the Kullback-Leibler divergence of component `c` from `heaviest`, or inf once it is surely above reach.
 
     inverse, log_det: of the covariance of `heaviest`. factor: (n, n) to work in.
     """
@@ -78,7 +78,7 @@ def _divergence(
 
 @borrowing
 def _near(mixture: Mixture, left: Ints, heaviest: int, reach: float, inverse: Floats, factor: Floats, out: Ints) -> int:
-    """Write the remaining components that `heaviest` represents to `out`, itself first; returns their number."""
+    """Write the remaining components that `heaviest` represents to `out`, itself first. Returns their number."""
     out[0] = heaviest
     if not cholesky(mixture.covs[heaviest], factor):
         return 1
@@ -120,8 +120,8 @@ def _merged(mixture: Mixture, reach: float) -> Mixture:
 def condensed(intensity: Mixture, max_components: int) -> Mixture:
     """The intensity in at most `max_components` components.
 
-    Similar components are merged; where there are still too many, less and less similar ones. Components lighter than a
-    billionth of the intensity are dropped, and the others raised to the same total.
+    Similar components are merged, and where there are still too many, less and less similar ones. Components lighter
+    than a billionth of the intensity are dropped, and the others raised to the same total.
     """
     found, reach = _merged(intensity, _REACH), _REACH
     total = log_sum(found.log_weights)

@@ -1,7 +1,7 @@
 """Written-out linear algebra for the few-by-few matrices of tracking: Cholesky factors, triangular solves, products.
 
 Inside a compiled loop these are two orders of magnitude faster than `@` and `np.linalg`, and quick to compile.
-Triangular results use the lower triangle only; the strict upper triangle is left as it was.
+Triangular results use the lower triangle only. The strict upper triangle is left as it was.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ def cholesky(matrix: Floats, factor: Floats) -> bool:
 
 @inlined
 def cholesky_of_size(matrix: Floats, factor: Floats, n: int) -> bool:
-    """Write the Cholesky factor, see `cholesky`; the loops are unrolled if the caller's `n` is a constant."""
+    """Write the Cholesky factor, see `cholesky`. The loops are unrolled if the caller's `n` is a constant."""
     for i in range(n):
         for j in range(i + 1):
             total = matrix[i, j]
@@ -56,7 +56,7 @@ def log_det_from_factor(factor: Floats) -> float:
 
 @inlined
 def solve_lower(factor: Floats, vector: Floats, out: Floats) -> None:
-    """out = L^-1 vector; `out` may be `vector`."""
+    """out = L^-1 vector. `out` may be `vector`."""
     for i in range(factor.shape[0]):
         total = vector[i]
         for k in range(i):
@@ -66,7 +66,7 @@ def solve_lower(factor: Floats, vector: Floats, out: Floats) -> None:
 
 @borrowing
 def solve_upper(factor: Floats, vector: Floats, out: Floats) -> None:
-    """out = L^-T vector; `out` may be `vector`."""
+    """out = L^-T vector. `out` may be `vector`."""
     n = factor.shape[0]
     for i in range(n - 1, -1, -1):
         total = vector[i]
@@ -126,7 +126,7 @@ def log_add(a: float, b: float) -> float:
 
 @borrowing
 def normalise_logs(values: Floats) -> float:
-    """Make the exponentials sum to one and return the log of their sum; -inf, without a change, for no values.
+    """Make the exponentials sum to one and return the log of their sum, or -inf, without a change, for no values.
 
     Taken from the largest, not from the sum: logs of -1e12 keep their differences, and so still sum to one.
     """
@@ -145,7 +145,7 @@ def normalise_logs(values: Floats) -> float:
 
 @borrowing
 def log_sum(values: Floats) -> float:
-    """log of the sum of exponentials; -inf for no values."""
+    """log of the sum of exponentials, or -inf for no values."""
     peak = -math.inf
     for value in values:
         peak = max(peak, value)

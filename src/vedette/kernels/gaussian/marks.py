@@ -78,7 +78,7 @@ def merge_marks(marks: Marks, chosen: Ints, weights: Floats, count: int, out: Ma
 
 @borrowing
 def pool_marks(marks: Marks, chosen: Ints, powers: Floats, count: int, out: Marks, target: int) -> float:
-    """Write the marks of the product of powers of the first `count` of `chosen`; return the log of its factor."""
+    """Write the marks of the product of powers of the first `count` of `chosen`, and return the log of its factor."""
     if out.log_class_probs.shape[1] == 0:
         return 0.0
     for k in range(out.log_class_probs.shape[1]):
@@ -90,7 +90,7 @@ def pool_marks(marks: Marks, chosen: Ints, powers: Floats, count: int, out: Mark
 
 @inlined
 def update_marks(marks: Marks, c: int, measurement: Floats, meas_dim: int, out: Marks, target: int) -> float:
-    """Write the marks of component `c` after a measurement; return the log of the factor of its weight."""
+    """Write the marks of component `c` after a measurement, and return the log of the factor of its weight."""
     if out.log_class_probs.shape[1] == 0:
         return 0.0
     first = row_length(meas_dim)
@@ -101,7 +101,7 @@ def update_marks(marks: Marks, c: int, measurement: Floats, meas_dim: int, out: 
 
 @inlined
 def _normalise_classes(log_class_probs: Floats) -> float:
-    """Normalise probabilities in place, all equal if their sum is 0; return the log of the sum."""
+    """Normalise probabilities in place, all equal if their sum is 0, and return the log of the sum."""
     log_sum = normalise_logs(log_class_probs)
     if log_sum == -math.inf:
         for k in range(len(log_class_probs)):

@@ -55,7 +55,7 @@ def require_gaussians(means: Floats, covs: Floats) -> None:
 
 @kernel
 def descending_order(values: Floats) -> Ints:
-    """Indices that sort `values` from the largest down; equal values keep their order. NaN is not allowed."""
+    """Indices that sort `values` from the largest down. Equal values keep their order. NaN is not allowed."""
     order = np.empty(len(values), np.int64)
     sort_descending(values, len(values), order, np.empty(len(values) if len(values) > _RUN else 0, np.int64))
     return order
@@ -100,7 +100,7 @@ def match_components(
 ) -> None:
     """Mean and covariance of the mixture of the first `count` of `components` (indices into `means` and `covs`).
 
-    weights: (>= count,) linear, not necessarily normalised; components count alike where all are zero.
+    weights: (>= count,) linear, not necessarily normalised. Components count alike where all are zero.
     """
     n = means.shape[1]
     if count == 1:
@@ -136,7 +136,7 @@ def match_components(
 def moment_match(log_weights: Floats, means: Floats, covs: Floats, out_mean: Floats, out_cov: Floats) -> None:
     """Mean and covariance of a Gaussian mixture.
 
-    log_weights: (num,) not necessarily normalised; components count alike where all are -inf. means: (num, state_dim).
+    log_weights: (num,) not necessarily normalised. Components count alike where all are -inf. means: (num, state_dim).
     covs: (num, state_dim, state_dim). out_mean: (state_dim,). out_cov: (state_dim, state_dim), symmetric.
     """
     count = len(log_weights)
@@ -158,7 +158,7 @@ def choose_all(log_weights: Floats, count: int, components: Ints, weights: Float
 
 @kernel
 def heaviest_of_runs(log_weights: Floats, offsets: Ints, chosen: Ints) -> Ints:
-    """Return the heaviest component (len(chosen),) of each chosen mixture, the first if equal; none is empty."""
+    """Return the heaviest component (len(chosen),) of each chosen mixture, the first if equal. None is empty."""
     heaviest = np.empty(len(chosen), np.int64)
     for i in range(len(chosen)):
         best = offsets[chosen[i]]

@@ -50,7 +50,7 @@ def moments_of(tracks: Tracks, first: int, last: int) -> Moments:
 
 @inlined
 def add_to_pool(track: int, weight: float, slot_of: Ints, pool: Ints, weights: Floats, end: int) -> int:
-    """Add `weight` to `track`'s place in the open pool, or give it the place `end`; the new end of the pool."""
+    """Add `weight` to `track`'s place in the open pool, or give it the place `end`. Returns the new end of the pool."""
     slot = slot_of[track]
     if slot < 0:
         slot_of[track] = end
@@ -65,7 +65,7 @@ def add_to_pool(track: int, weight: float, slot_of: Ints, pool: Ints, weights: F
 def _gather(
     tracks: Tracks, pool: Ints, weights: Floats, low: int, high: int, components: Ints, component_weights: Floats
 ) -> int:
-    """Components of the pool `low:high` and their linear weights, into the last two arguments; their number."""
+    """Components of the pool `low:high` and their linear weights, into the last two arguments. Returns their number."""
     count, log_weights = 0, tracks.components.log_weights
     for p in range(low, high):
         for source in range(tracks.offsets[pool[p]], tracks.offsets[pool[p] + 1]):
@@ -122,7 +122,7 @@ def pooled_tracks(
 
 @kernel
 def reduced_tracks(tracks: Tracks, caps: MixtureCaps) -> Tracks:
-    """The tracks with their mixtures reduced by the caps; the same bundle where each is one Gaussian."""
+    """The tracks with their mixtures reduced by the caps, or the same bundle where each is one Gaussian."""
     num = len(tracks.labels)
     if len(tracks.components.log_weights) == num:
         return tracks

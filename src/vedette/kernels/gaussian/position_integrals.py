@@ -131,7 +131,7 @@ def share_in_sector(dx: float, dy: float, cov: Floats, max_range: float, middle:
         dx, dy: its mean, m.
         cov: covariance whose first block of 2 is the position's, m^2.
         max_range: m.
-        middle, half_width: rad; half_width pi: all round.
+        middle, half_width: rad. half_width pi: all round.
     """
     away, reach = math.sqrt(dx * dx + dy * dy), _REACH * math.sqrt(cov[0, 0] + cov[1, 1])
     if away - reach > max_range:

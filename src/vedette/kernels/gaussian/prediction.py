@@ -33,7 +33,7 @@ def _predict_sigma_points(
 def predict(
     motion: Motion, dt: float, mean: Floats, cov: Floats, out_mean: Floats, out_cov: Floats, scratch: Scratch
 ) -> None:
-    """m <- f(m), P <- F P F' + Q over `dt` seconds, F the Jacobian of f at m; or the moments of sigma points, and Q.
+    """m <- f(m), P <- F P F' + Q over `dt` seconds, F the Jacobian of f at m, or the moments of sigma points, and Q.
 
     The process noise Q is taken at the prior mean.
     """

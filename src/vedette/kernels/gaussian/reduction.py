@@ -60,7 +60,7 @@ def make_reduction_work(num: int, like: Mixture) -> ReductionWork:
 
 @borrowing
 def _near(heaviest: int, wide: Mixture, width: int, merge_distance: float, work: ReductionWork) -> int:
-    """Components (-> work.near, `heaviest` first) in play within `merge_distance` of `heaviest`; their number."""
+    """Components (-> work.near, `heaviest` first) in play within `merge_distance` of `heaviest`, and their number."""
     means, covs, near = wide.means, wide.covs, work.near
     factor, difference, n = work.factor, work.difference, wide.means.shape[1]
     near[0] = heaviest
@@ -89,7 +89,7 @@ def _near(heaviest: int, wide: Mixture, width: int, merge_distance: float, work:
 @borrowing
 def _merge(wide: Mixture, width: int, log_floor: float, merge_distance: float, work: ReductionWork) -> int:
     """Greedy merging (-> work.merged), heaviest component first, of those of at least `log_floor` (the heaviest always
-    stays); how many there are then.
+    stays). Returns how many there are then.
     """
     log_weights, left, order, merged = wide.log_weights, work.left, work.order, 0
     sort_descending(log_weights, width, order, work.buffer)
@@ -114,10 +114,10 @@ def _merge(wide: Mixture, width: int, log_floor: float, merge_distance: float, w
 
 @borrowing
 def reduce_into(wide: Mixture, width: int, caps: MixtureCaps, work: ReductionWork, out: Mixture, filled: int) -> int:
-    """Append the first `width` components within the caps, heaviest first, with the same total weight; the new end.
+    """Append the first `width` components within the caps, heaviest first, total weight kept. Return the new end.
 
-    Light components are dropped; then, greedily from the heaviest, all components within the merging distance of it
-    (under its covariance) are merged by moment matching; then the heaviest stay.
+    Light components are dropped. Then, greedily from the heaviest, all components within the merging distance of it
+    (under its covariance) are merged by moment matching. Then the heaviest stay.
     """
     total = log_sum(wide.log_weights[:width])
     if caps.max_components == 1 or width <= 1 or total == -math.inf:

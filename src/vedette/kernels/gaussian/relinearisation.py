@@ -85,7 +85,7 @@ def _squared_distance(sensor: Sensor, pair: Pair, state: Floats, scratch: Scratc
 
 @borrowing
 def _update(sensor: Sensor, pair: Pair, state: Floats, work: PairWork) -> float:
-    """Update by z = predicted + H (x - state) + noise; returns the squared distance of the measurement.
+    """Update by z = predicted + H (x - state) + noise. Returns the squared distance of the measurement.
 
     H and the covariance of the noise are those of the scratch, where the whitened residual is left. Only the nonlinear
     part of the residual is wrapped.
@@ -114,7 +114,7 @@ def _linearise(sensor: Sensor, pair: Pair, state: Floats, work: PairWork) -> Non
 
 @borrowing
 def _climb(sensor: Sensor, pair: Pair, work: PairWork) -> float:
-    """Move `points[0]` of the scratch to a peak of prior times likelihood; returns its squared distance.
+    """Move `points[0]` of the scratch to a peak of prior times likelihood. Returns its squared distance.
 
     By Gauss-Newton steps, halved until the distance decreases.
     """
@@ -186,14 +186,14 @@ def _regress(sensor: Sensor, pair: Pair, work: PairWork) -> None:
 
 @borrowing
 def _expect_and_whiten(sensor: Sensor, pair: Pair, work: PairWork) -> float:
-    """Fill the innovation of the Gaussian (noise of the pair); returns the squared distance of the measurement."""
+    """Fill the innovation of the Gaussian (noise of the pair). Returns the squared distance of the measurement."""
     expect_measurement(sensor, pair.pose, pair.mean, pair.cov, pair.measurement, 0, work.innovation, work.scratch)
     return whiten(work.innovation, 0, pair.measurement, sensor.periods, math.inf, work.scratch.residual)
 
 
 @borrowing
 def relinearise(sensor: Sensor, pair: Pair, work: PairWork) -> float:
-    """Update a pair; returns the squared distance of its measurement under the last linearisation.
+    """Update a pair. Returns the squared distance of its measurement under the last linearisation.
 
     The innovation holds that of the Gaussian (sigma points) before, and that of the pair afterwards. Its `predicted` is
     of no use then: the whitened residual is left in `work.scratch.residual`.
@@ -251,7 +251,7 @@ def update_pair(sensor: Sensor, pair: Pair, gate: float, work: PairWork, out: Fl
     """Update a pair and write posterior mean and covariance to the rows of `out`, mean first.
 
     By `relinearise`, but by the linear update if the measurement brings a noise with which it does not bend. Returns
-    the squared distance of the measurement; above `gate` nothing is written.
+    the squared distance of the measurement. Above `gate` nothing is written.
     """
     distance, bends = 0.0, True
     if has_own_noise(pair.measurement, work.innovation.predicted.shape[1]):

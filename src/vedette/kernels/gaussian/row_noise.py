@@ -7,7 +7,7 @@ features that differ between them.
 
 A variance of 0 leaves the component to the sensor's noise model. One below 0 is minus a variance that is added to that
 of the noise model, such as the error of the sensor's own pose. With a variance of `MISSING` a component was not
-measured; the likelihood ratio then makes up for the density of so wide a Gaussian, and clutter has the density of the
+measured. The likelihood ratio then makes up for the density of so wide a Gaussian, and clutter has the density of the
 other components.
 """
 
@@ -29,7 +29,7 @@ def row_length(meas_dim: int) -> int:
 
 @inlined
 def largest_class_ratio(measurement: Floats, meas_dim: int) -> float:
-    """Return the largest log likelihood ratio of a class, a bound on the factor of any component; 0 without any."""
+    """Return the largest log likelihood ratio of a class, a bound on the factor of any component, or 0 without any."""
     first = row_length(meas_dim)
     largest = -math.inf if measurement.shape[0] > first else 0.0
     for place in range(first, measurement.shape[0]):
@@ -85,5 +85,5 @@ def replace_noise(measurement: Floats, noise: Floats) -> None:
 
 @inlined
 def log_likelihood_ratio(measurement: Floats, meas_dim: int) -> float:
-    """Return the log likelihood ratio of a measurement's features; 0 without any."""
+    """Return the log likelihood ratio of a measurement's features, or 0 without any."""
     return measurement[row_length(meas_dim) - 1] if has_own_noise(measurement, meas_dim) else 0.0

@@ -23,7 +23,7 @@ def _within(value: float, period: float) -> float:
 
 @kernel
 def wrap_columns(values: Floats, periods: Floats) -> None:
-    """Wrap (n, dim) values to (-period / 2, period / 2] in place; those already there keep every bit."""
+    """Wrap (n, dim) values to (-period / 2, period / 2] in place. Those already there keep every bit."""
     for i in range(len(values)):
         for j in range(len(periods)):
             values[i, j] = _within(values[i, j], periods[j])
@@ -31,7 +31,7 @@ def wrap_columns(values: Floats, periods: Floats) -> None:
 
 @kernel
 def add_noise(measured: Floats, noise: Floats, periods: Floats) -> int:
-    """Add z_i += v_i in place, wrapped; returns the first row that is not finite, where it stops, or -1.
+    """Add z_i += v_i in place, wrapped. Returns the first row that is not finite, where it stops, or -1.
 
     periods: (dim,) of the components, see `Sensor`.
     """

@@ -53,7 +53,7 @@ def make_scratch(state_dim: int, meas_dim: int) -> Scratch:
 
 @inlined
 def wrap(value: float, period: float) -> float:
-    """The same value in (-period / 2, period / 2]; period inf: unchanged."""
+    """The same value in (-period / 2, period / 2]. With period inf: unchanged."""
     half = 0.5 * period
     if period == math.inf or not (value <= -half or value > half):  # NaN stays
         return value

@@ -1,6 +1,6 @@
 """Sigma points: 2 n + 1 or 2 n states whose weighted mean and covariance are those of a Gaussian.
 
-UNSCENTED has 2 n + 1 points with kappa = 1 (Julier and Uhlmann 1997; all weights positive, so that covariances stay
+UNSCENTED has 2 n + 1 points with kappa = 1 (Julier and Uhlmann 1997, all weights positive, so that covariances stay
 positive definite), CUBATURE the 2 n points of the third-degree rule (Arasaratnam and Haykin 2009). LINEARISED uses
 Jacobians and no points. SWITCHED does too, except for a Gaussian over which measurements bend (`innovation.bends`).
 """
@@ -53,7 +53,7 @@ def fill_sigma_points(method: int, mean: Floats, cov: Floats, points: Floats, fa
 def moments_of_images(
     images: Floats, weights: PointWeights, dim: int, periods: Floats, mean: Floats, cov: Floats
 ) -> None:
-    """Weighted mean and covariance of the images; they are left as deviations from the mean.
+    """Weighted mean and covariance of the images. They are left as deviations from the mean.
 
     Components with a period, such as angles, are averaged as deviations from the first image, so that a cloud across
     +-pi has its mean inside the cloud.

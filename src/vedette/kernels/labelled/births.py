@@ -30,7 +30,7 @@ def births_of_measurements(states: Floats, unexplained: Floats, begin: BirthsOfM
 
     Args:
         states: (num, state_dim) of the targets, at rest where they were measured.
-        unexplained: (num,) probabilities that no track explains the measurement; the expected number of births is
+        unexplained: (num,) probabilities that no track explains the measurement. The expected number of births is
             divided in proportion to them.
         begin: the other parameters.
     """
@@ -54,7 +54,7 @@ def births_of_measurements(states: Floats, unexplained: Floats, begin: BirthsOfM
 
 @kernel
 def births_within(first: Lmb, second: Lmb, share: float) -> Lmb:
-    """Return the targets of two LMBs, each born within a share of the time: 1 - r' = (1 - r)^share; 1: unchanged."""
+    """Return the targets of two LMBs, each born within a share of the time: 1 - r' = (1 - r)^share. 1: unchanged."""
     num, components = len(first.existence_logit), first.tracks.offsets[-1]
     labels = np.concatenate((first.tracks.labels, second.tracks.labels))
     offsets = np.concatenate((first.tracks.offsets, second.tracks.offsets[1:]))

@@ -51,7 +51,7 @@ def glmb_cases_to_lmb(
     """Convert cases `first:last` of marginalised GLMBs to LMBs by moments, each as `glmb_to_lmb` does.
 
     members: (num_members, 2) label of each member of each label set. labels: (num_labels, 2) all of them in increasing
-    order; a label without any set in a case gets logit -inf there, and no Gaussian.
+    order. A label without any set in a case gets logit -inf there, and no Gaussian.
     """
     num = len(members)
     offsets, components = np.arange(num + 1), make_components(num, cases.means.shape[2], no_marks())

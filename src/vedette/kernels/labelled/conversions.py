@@ -39,9 +39,9 @@ def marginalise(glmb: Glmb, caps: MixtureCaps) -> Glmb:
     """Return the marginalised GLMB: one hypothesis per label set, over all association histories (paper eq. 10).
 
     Each track of a label set is the mixture of that label's tracks in the set's hypotheses, weighted by them, and
-    reduced under the caps; with `max_components` 1 it is one Gaussian of the mixture's moments. Each (label set, label)
+    reduced under the caps. With `max_components` 1 it is one Gaussian of the mixture's moments. Each (label set, label)
     has its own entry in the track table, in the order of the hypotheses. Hypotheses are in order of descending weight,
-    equal weights in the order of their first occurrence; a label set of weight zero is kept.
+    equal weights in the order of their first occurrence. A label set of weight zero is kept.
     """
     group_of, first = group_by_label_set(glmb)
     return marginalise_sets(glmb, group_of, first, caps)[0]
@@ -49,7 +49,7 @@ def marginalise(glmb: Glmb, caps: MixtureCaps) -> Glmb:
 
 @kernel
 def marginalise_sets(glmb: Glmb, group_of: Ints, first: Ints, caps: MixtureCaps) -> tuple[Glmb, Ints]:
-    """Marginalise hypotheses with given numbers of label sets; also return the set of each resulting hypothesis.
+    """Marginalise hypotheses with given numbers of label sets, and also return the set of each resulting hypothesis.
 
     group_of: (num_hyps,) number of each hypothesis's label set. first: (num_sets,) the first hypothesis of each set.
     """
@@ -149,7 +149,7 @@ def factors_to_lmb(glmb: Glmb, labels: Ints, label_of: Ints, firsts: Ints, ends:
 
 @kernel
 def _normalise_kept(log_weights: Floats, complete: bool) -> float:
-    """Normalise the log weights of the kept hypotheses; return the weight left out, 0 if the list is complete."""
+    """Normalise the log weights of the kept hypotheses, and return the weight left out, 0 if the list is complete."""
     log_kept = log_sum(log_weights)
     for h in range(len(log_weights)):
         log_weights[h] -= log_kept
@@ -160,7 +160,7 @@ def _normalise_kept(log_weights: Floats, complete: bool) -> float:
 def factored_to_glmb(density: FactoredGlmb, label_of: Ints, num_labels: int, max_hypotheses: int) -> tuple[Glmb, float]:
     """Return the GLMB of the `max_hypotheses` heaviest products of one hypothesis per factor, and the weight left out.
 
-    The GLMB shares the track table; its weights are normalised. Products of weight zero are never listed, so with a
+    The GLMB shares the track table. Its weights are normalised. Products of weight zero are never listed, so with a
     large `max_hypotheses` all the others are listed and the weight left out is zero. Equal weights are in the order in
     which the search finds them, which is deterministic. label_of: (num_tracks,) place of the label of each track
     among all labels, `num_labels`.

@@ -40,7 +40,7 @@ def _established_label(choices: Choices, existences: Floats, label: int) -> int:
 def _rename(choices: Choices, existences: Floats, label: int, known: int, labels: Ints) -> None:
     """Give the tracks of a label to another one. Hypotheses that hold both lose their weight.
 
-    labels: (num_tracks, 2) of the tracks; written.
+    labels: (num_tracks, 2) of the tracks, written.
     """
     for h in range(len(choices.weights)):
         track = choices.symbols[h, label]
@@ -59,8 +59,8 @@ def _rename(choices: Choices, existences: Floats, label: int, known: int, labels
 def with_established_labels(glmb: Glmb, choices: Choices, max_error: float) -> tuple[Glmb, Choices, float]:
     """Return the GLMB without improbable alternative labels, its choices, and the L1 change of the density.
 
-    choices: of the GLMB, heaviest first; written. max_error: bound on the L1 error of the labelled density, twice the
-    existence of the removed labels; the least probable ones are removed first. Tracks without a hypothesis stay in the
+    choices: of the GLMB, heaviest first, written. max_error: bound on the L1 error of the labelled density, twice the
+    existence of the removed labels. The least probable ones are removed first. Tracks without a hypothesis stay in the
     table.
     """
     num_labels, spent = len(choices.labels), 0.0

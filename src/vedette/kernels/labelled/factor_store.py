@@ -110,7 +110,7 @@ def _close_factor(store: FactorStore) -> None:
 
 @inlined
 def append_single(store: FactorStore, step: int, index: int, end: int, logit: float) -> None:
-    """Append a factor of one label, absent or present; its components are already written, up to `end`."""
+    """Append a factor of one label, absent or present. Its components are already written, up to `end`."""
     filled = store.filled
     hyp, entry = filled[_HYPS], filled[_ENTRIES]
     store.hyp_log_weights[hyp], store.hyp_log_weights[hyp + 1] = -log_add(0.0, logit), -log_add(0.0, -logit)

@@ -1,7 +1,7 @@
 """Generalised covariance intersection of track densities: weighted geometric means of Gaussian mixtures.
 
 The fused density of one label is proportional to f = prod_i GM_i^(w_i) over the sensors i that know the label. A
-power of a mixture is not a mixture; its component-wise substitute, q = prod_i sum_c (a_ic N_ic)^(w_i) >= f, is one with
+power of a mixture is not a mixture. Its component-wise substitute, q = prod_i sum_c (a_ic N_ic)^(w_i) >= f, is one with
 a Gaussian for every combination of components. With cubature points, each Gaussian N_c of q is given the mass and the
 moments that f = q (f / q) has under it, where 0 < f / q <= 1.
 """
@@ -136,7 +136,7 @@ def _log_ratio(powers: Powers) -> float:
 
 @kernel
 def _correct(powers: Powers, points: Floats, point_weights: Floats, mean: Floats, cov: Floats) -> float:
-    """Give a Gaussian of q the moments of f / q times it, by cubature; return the log of the retained mass."""
+    """Give a Gaussian of q the moments of f / q times it, by cubature, and return the log of the retained mass."""
     dim, num = len(mean), len(points)
     offset, images, masses, total = powers.offset, np.empty((num, dim)), np.empty(num), 0.0
     if not cholesky(cov, powers.factor):
@@ -189,7 +189,7 @@ def fuse_tracks(
 
     chosen: (num, S) track of each sensor, -1 if it does not know the label: its factor is left out and the other
     sensors' weights are scaled to sum to one. fusion_weights: (num, S) positive if known. points: (num_points, dim),
-    point_weights: (num_points,) a cubature rule for the standard normal without negative weights; with no points the
+    point_weights: (num_points,) a cubature rule for the standard normal without negative weights. With no points the
     fused mixture is the component-wise power. A fused mixture has a component for every combination of the sensors'
     components. The points take the classes of a mixture as independent of its states.
 

@@ -12,7 +12,7 @@ from vedette.kernels.base.types import Floats, Ints
 
 @kernel
 def group_log_sums(values: Floats, group_of: Ints, num_groups: int) -> Floats:
-    """Log-sum-exp of the values of each group, shape (num_groups,); -inf for an empty group."""
+    """Log-sum-exp of the values of each group, shape (num_groups,), or -inf for an empty group."""
     peaks, totals = np.full(num_groups, -math.inf), np.zeros(num_groups)
     for i in range(len(values)):
         peaks[group_of[i]] = max(peaks[group_of[i]], values[i])

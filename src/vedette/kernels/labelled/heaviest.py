@@ -109,7 +109,7 @@ def _of_several(sizes: FactorSizes, several: Ints) -> tuple[Floats, Ints]:
 def heaviest_tracks(density: FactoredGlmb, sizes: FactorSizes, shared: Shares, number: int) -> Ints:
     """Tracks of the heaviest product with this number of targets, in label order, shape (number,).
 
-    number: of positive probability. On a tie: the fewest targets in earlier factors; the earlier hypothesis;
+    number: of positive probability. On a tie: the fewest targets in earlier factors, then the earlier hypothesis, then
     among factors of at most one target, those of smaller labels.
     """
     singles, several = shared.singles, shared.several

@@ -36,7 +36,7 @@ def _log_gaussians(tracks: Tracks, a: int, b: int, offset: Floats, factor: Float
 
 @kernel
 def log_tracks(tracks: Tracks, a: int, b: int) -> float:
-    """Return log <p, q> of the mixtures of tracks `a` and `b`; NaN if a covariance is not positive definite."""
+    """Return log <p, q> of the mixtures of tracks `a` and `b`, or NaN if a covariance is not positive definite."""
     n, log_weights = tracks.components.means.shape[1], tracks.components.log_weights
     offset, factor, total = np.empty(n), np.empty((n, n)), -math.inf
     for i in range(tracks.offsets[a], tracks.offsets[a + 1]):
@@ -125,7 +125,7 @@ def log_glmbs(glmb: Glmb, split: int, log_unit_volume: float, common: bool, self
 
 @kernel
 def log_probabilities(logit: float) -> tuple[float, float]:
-    """Return log r and log (1 - r) of a logit; exact at +-inf."""
+    """Return log r and log (1 - r) of a logit, exact at +-inf."""
     if logit >= 0.0:
         tail = math.log1p(math.exp(-logit))
         return -tail, -logit - tail

@@ -159,7 +159,7 @@ def _weigh(item: int, factors: _GaussianFactors, work: _Work) -> tuple[bool, flo
 def _solve(
     item: int, predicted: Floats, factors: _GaussianFactors, work: _Work, mean: Floats, cov: Floats
 ) -> tuple[bool, float]:
-    """Write m+ + C (I + A)^-1 eta and C (I + A)^-1 C'; return True if that is definite, and the log of the integral."""
+    """Write m+ + C (I + A)^-1 eta and C (I + A)^-1 C'. Return True if that is definite, and the log of the integral."""
     n = len(mean)
     positive, log_integral = _weigh(item, factors, work)
     if not positive:
@@ -213,7 +213,7 @@ def update_in_parallel(
     """Fused mean, covariance and log of the integral of p+ prod_s (p_s / p+)^(v_s) of each label.
 
     means: (num, dim), covs: (num, dim, dim) of the prediction. chosen: (num, S) the sensors' posteriors in `own`, -1
-    for a sensor without information. weights: (S,) the exponents v_s, non-negative; for mixtures 1. max_choices:
+    for a sensor without information. weights: (S,) the exponents v_s, non-negative, for mixtures 1. max_choices:
     largest number of choices of one component per sensor that are followed. A label without information from any sensor
     keeps its prediction unchanged.
 
@@ -254,7 +254,7 @@ def update_in_parallel(
 
 @kernel
 def _merge(count: int, choices: _GaussianFactors, predicted: Floats, work: _Work, mean: Floats, cov: Floats) -> float:
-    """Write the mean and covariance of the mixture of the choices; return the log of its integral."""
+    """Write the mean and covariance of the mixture of the choices, and return the log of its integral."""
     n = len(predicted)
     log_weights, means, covs = np.empty(count), np.empty((count, n)), np.empty((count, n, n))
     for c in range(count):

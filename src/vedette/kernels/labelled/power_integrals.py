@@ -8,7 +8,7 @@ a weighted list of label sets (a GLMB is one factor, an LMB one per label, with 
               a w_p(L) + b sum_s w_s log weight_s(L) + (a + b - 1) |L| log K + sum over l in L of log integral p^a g^b,
 
 where the last p and g are of one label. Every case is prepared once on the label sets of the prediction, its log
-weights and information rows scaled by its sensor's power; a product is then a sum of rows. Single Gaussians only; the
+weights and information rows scaled by its sensor's power. A product is then a sum of rows. Single Gaussians only. The
 rows of one label share one reference.
 """
 
@@ -36,7 +36,7 @@ _LOST = 60.0
 
 
 class SensorCases(NamedTuple):
-    """One sensor's densities on its own label sets; a member is a (label set, label)."""
+    """One sensor's densities on its own label sets. A member is a (label set, label)."""
 
     log_weights: Floats  # (num_cases, num_sets)
     held: Bools  # (num_cases, num_sets) False if the case has lost the set
@@ -55,7 +55,7 @@ class Places(NamedTuple):
 
 
 class PreparedCases(NamedTuple):
-    """Cases of all sensors on one list of factors, label sets and members; w is the power of the case's sensor."""
+    """Cases of all sensors on one list of factors, label sets and members. Here w is the power of the case's sensor."""
 
     factor_offsets: Ints  # (num_factors + 1,) into the label sets
     set_offsets: Ints  # (num_sets + 1,) into the members
@@ -115,7 +115,7 @@ def write_rows(cases: SensorCases, places: Places, power: float, first: int, las
     """Write the information rows of cases `first:last`, scaled by the sensor's power.
 
     If a case lacks a label set, the row is of the Gaussian of the label's mean and covariance over the sets that it
-    has; zeros if it has the label in none.
+    has, or zeros if it has the label in none.
     """
     dim, most = cases.means.shape[2], 1
     for m in range(len(places.members)):
@@ -159,7 +159,7 @@ def _multiply(laid: PreparedCases, chosen: Ints, member: int, product: Floats) -
 
     If some lack the label, the others' powers sum to one.
 
-    chosen: each sensor's case with the first sample; the other samples' follow it.
+    chosen: each sensor's case with the first sample. The other samples' follow it.
     """
     size, num_samples, away = product.shape[0], product.shape[1], 0
     for sample in range(num_samples):
@@ -324,7 +324,7 @@ def power_table(
 ) -> None:
     """Write Z (num_joint, num_samples, num_pairs) of joint actions `first:last`, the pairs in the order of `terms`.
 
-    actions: (num_joint, num_sensors) one action of each sensor; with a sample it is the sensor's case
+    actions: (num_joint, num_sensors) one action of each sensor. With a sample it is the sensor's case
     `first_cases + action * num_samples + sample`. NaN if a precision of positive powers is not positive definite.
     """
     num_sensors, num_samples, size = len(first_cases), out.shape[1], laid.rows.shape[2]

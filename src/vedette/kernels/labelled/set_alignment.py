@@ -24,7 +24,7 @@ class Sets(NamedTuple):
 
 
 class Aligned(NamedTuple):
-    """All sensors on the union of their label sets; a member is a (label set, label)."""
+    """All sensors on the union of their label sets. A member is a (label set, label)."""
 
     offsets: Ints  # (num_sets + 1,) into members
     groups: Ints  # (num_sets,) the group of each set: densities are products over the groups

@@ -25,7 +25,7 @@ SURE, LOST = 0.9, 0.5
 
 
 class SetRule(NamedTuple):
-    """Parameters of the fusion of label sets; see `CmDeltaGlmb`."""
+    """Parameters of the fusion of label sets, see `CmDeltaGlmb`."""
 
     weights: Floats  # (num_sensors,) positive
     missing_log_weight: float
@@ -34,7 +34,7 @@ class SetRule(NamedTuple):
 
 
 class SetReport(NamedTuple):
-    """Repairs and truncations of a fusion; see `FusionInfo`."""
+    """Repairs and truncations of a fusion, see `FusionInfo`."""
 
     missing_sets: Ints  # (num_sensors,)
     missing_labels: Ints  # (num_sensors,)
@@ -47,7 +47,7 @@ class SetReport(NamedTuple):
 
 @kernel
 def fuse_glmbs(stack: Glmb, sensor_of: Ints, rule: SetRule) -> tuple[Glmb, SetReport]:
-    """Fuse GLMBs, delta or marginalised. stack: of all sensors; sensor_of: (num_hyps,), increasing."""
+    """Fuse GLMBs, delta or marginalised. stack: of all sensors. sensor_of: (num_hyps,), increasing."""
     density, report = fuse_sets(_marginalised(stack, sensor_of, len(rule.weights), rule.power.caps), 1, rule)
     return Glmb(density.tracks, density.hyp_offsets, density.hyp_tracks, density.hyp_log_weights), report
 

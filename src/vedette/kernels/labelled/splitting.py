@@ -85,7 +85,7 @@ def _same_choice(symbols: Ints, a: int, b: int, part_of: Ints, part: int) -> boo
 
 
 class _Parts(NamedTuple):
-    """Parts of the labels, each identified by its first label; rows of other labels are not current."""
+    """Parts of the labels, each identified by its first label. Rows of other labels are not current."""
 
     groups: Ints  # (num_labels, num_hyps) number of each hypothesis's choice among those of the part
     sums: Floats  # (num_labels, num_hyps) weight of each of the part's choices
@@ -132,9 +132,9 @@ def _alone(choices: Choices) -> _Parts:
 
 @borrowing
 def _pair_choices(parts: _Parts, a: int, b: int, weights: Floats, groups: Ints, sums: Floats) -> int:
-    """Number the joint choices of two parts, and sum their weights; return their number.
+    """Number the joint choices of two parts, sum their weights, and return their number.
 
-    groups, sums: (num_hyps,) written; the rows of either part may be given.
+    groups, sums: (num_hyps,) written. The rows of either part may be given.
     """
     table, keys, count, last = parts.table, parts.keys, 0, len(parts.table) - 1
     num_b = parts.counts[b]

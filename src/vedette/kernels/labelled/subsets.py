@@ -45,9 +45,9 @@ def _sift_down(heap: Ints, sums: Floats, size: int) -> None:
 def smallest_sums(costs: Floats, offsets: Ints, max_sums: int) -> tuple[Ints, Ints, Ints, Ints, bool]:
     """Return the `max_sums` smallest sums of one cost from each of several lists, the smallest first.
 
-    costs, offsets: list `i` is `costs[offsets[i]:offsets[i + 1]]`, from 0 up; an infinite cost is never taken. Returns
+    costs, offsets: list `i` is `costs[offsets[i]:offsets[i + 1]]`, from 0 up. An infinite cost is never taken. Returns
     chains of nodes: choice `k` takes place `places[node]` of list `lists[node]` for node = order[k], previous[node],
-    previous[previous[node]], ... down to node 0, and the first of every other list; and True if all choices of finite
+    previous[previous[node]], ... down to node 0, and the first of every other list, and True if all choices of finite
     costs are listed.
     """
     num_lists = len(offsets) - 1

@@ -55,7 +55,7 @@ def _make_work(num: int, dim: int) -> _Work:
 
 @borrowing
 def _versions_of(labels: Ints, step: int, index: int, weights: Floats, versions: Ints) -> int:
-    """Write the tracks of a label, heaviest first; return their number."""
+    """Write the tracks of a label, heaviest first, and return their number."""
     count = 0
     for track in range(len(weights)):
         if labels[track, 0] != step or labels[track, 1] != index:
@@ -195,7 +195,7 @@ def merge_versions(glmb: Glmb, choices: Choices, caps: MixtureCaps, max_error: f
 
     Only versions within `caps.merge_distance` of a heavier one, under its covariance, are merged, those of the least
     change of the density first, while all changes sum to at most `max_error` before mixtures are reduced. A merged
-    track is the mixture of its versions, each weighted by all hypotheses that hold it, and reduced; hypotheses that are
+    track is the mixture of its versions, each weighted by all hypotheses that hold it, and reduced. Hypotheses that are
     then equal are merged. The result is heaviest first.
     """
     if not (caps.merge_distance > 0.0 and max_error > 0.0):

@@ -1,4 +1,4 @@
-"""Coordinate ascent on rewards that are sums over labels; a line costs only what its sensor can reach."""
+"""Coordinate ascent on rewards that are sums over labels. A line costs only what its sensor can reach."""
 
 from __future__ import annotations
 

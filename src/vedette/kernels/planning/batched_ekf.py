@@ -1,6 +1,6 @@
 """Extended Kalman steps of many Gaussians side by side, in loops that the compiler vectorises.
 
-The formulas are those of `vedette.kernels.gaussian.prediction` and `innovation`; entry (i, j) of all matrices is one
+The formulas are those of `vedette.kernels.gaussian.prediction` and `innovation`. Entry (i, j) of all matrices is one
 row of numbers, one per Gaussian. If a number is not valid (a matrix that is not definite, a difference that cancels),
 and for sigma points, a Gaussian is processed alone by those kernels, whose result is final.
 """
@@ -47,7 +47,7 @@ from vedette.kernels.planning.batched_models import (
 
 
 class BatchedGaussians(NamedTuple):
-    """Predicted Gaussians and their expected measurements, as in `Innovation`; lower triangles of the matrices."""
+    """Predicted Gaussians and their expected measurements, as in `Innovation`, with lower triangles of the matrices."""
 
     means: Floats  # (state_dim, room)
     covs: Floats  # (state_dim (state_dim + 1) / 2, room)
@@ -147,7 +147,7 @@ def _lower(i: int, j: int) -> int:
 def _predict_linear(
     forms: ModelForms, means: Floats, covs: Floats, num: int, batch: BatchedGaussians, work: BatchWork
 ) -> int:
-    """Apply m <- F m, P <- F P F' + Q; returns how many are not finite or not positive on the diagonal."""
+    """Apply m <- F m, P <- F P F' + Q. Returns how many are not finite or not positive on the diagonal."""
     dim, transition, noise, wrong = means.shape[0], forms.transition, forms.motion_noise, 0
     for i in range(dim):
         _set(0.0, num, batch.means[i])
@@ -274,7 +274,7 @@ def _mark_bent(form: int, pose: Floats, num: int, batch: BatchedGaussians, work:
 
 @inlined
 def _mark_cancelled(num: int, batch: BatchedGaussians, work: BatchWork) -> int:
-    """Set the volumes of Gaussians that must be processed alone to NaN, see `innovation`; returns their number."""
+    """Set the volumes of Gaussians that must be processed alone to NaN, see `innovation`. Returns their number."""
     volume, noise, wrong = work.volume, work.noise, 0
     if batch.predicted.shape[0] == 1:
         own = noise[0]
@@ -362,7 +362,7 @@ def relinearise_batch(
 ) -> None:
     """Replace innovations of strongly nonlinear Gaussians by those near their measurements, if these are detected.
 
-    measurements: (meas_dim, room); those of such Gaussians become whitened residuals, whose expectation is zero with
+    measurements: (meas_dim, room). Those of such Gaussians become whitened residuals, whose expectation is zero with
     unit covariance.
     """
     for s in range(num):

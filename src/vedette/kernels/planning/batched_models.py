@@ -1,7 +1,7 @@
 """Models at many states side by side: built-in ones in loops that the compiler vectorises, others state by state.
 
 A model is a function of one state. For the built-in models most used in decisions, the same formulas are implemented
-here over an index of states; `ModelForms` selects them for a decision. All arrays have the states along their last
+here over an index of states. `ModelForms` selects them for a decision. All arrays have the states along their last
 axis. Each loop writes one array, because the compiler does not vectorise loops over many arrays that might overlap.
 """
 
@@ -118,7 +118,7 @@ def fill_measurements(
 def fill_jacobians(
     sensor: Sensor, form: int, pose: Floats, states: Floats, offsets: Offsets, num: int, scratch: Scratch, out: Floats
 ) -> None:
-    """Write out (meas_dim * state_dim, room): Jacobians of the measurement, row by row; see `jacobian_width`."""
+    """Write out (meas_dim * state_dim, room): Jacobians of the measurement, row by row, see `jacobian_width`."""
     dim = states.shape[0]
     if form == BEARING_RANGE:
         across, along, right, up = out[0], out[1], out[dim], out[dim + 1]
@@ -150,7 +150,7 @@ def fill_jacobians(
 
 @inlined
 def jacobian_width(form: int, state_dim: int) -> int:
-    """Return the number of columns of a measurement's Jacobian that are filled in; the others are zero."""
+    """Return the number of columns of a measurement's Jacobian that are filled in. The others are zero."""
     return state_dim if form == ANY else 2
 
 

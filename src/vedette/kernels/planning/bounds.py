@@ -2,13 +2,13 @@
 
 The expected loss of a label is r (q e(P+) + (1 - q) e(P)), with e(P) = min(tr P, c^2)^h of the position's covariance,
 P+^-1 = P^-1 + J / q and q = 1 - exp(m). The information J and the log probability m of missing the label are sums over
-sensors. 1 / tr P is concave in P^-1, so a decreasing convex function of it is convex in P^-1; q e(P^-1 + J / q), its
-perspective, is convex in q and J (Boyd and Vandenberghe 2004, section 3.2). As the loss decreases with q, and q is
+sensors. 1 / tr P is concave in P^-1, so a decreasing convex function of it is convex in P^-1, and q e(P^-1 + J / q),
+its perspective, is convex in q and J (Boyd and Vandenberghe 2004, section 3.2). As the loss decreases with q, and q is
 concave in m, it is convex in the sums, if e is replaced by the largest convex function of 1 / tr P that is not above
 e: a straight line where the cutoff matters.
 
 A convex loss is nowhere below its tangents. A tangent is itself a sum over sensors, whose least value has each
-sensor on its own best course; undetected targets, 1 - exp(sum), are treated alike. Steps of Frank and Wolfe (1956)
+sensor on its own best course. Undetected targets, 1 - exp(sum), are treated alike. Steps of Frank and Wolfe (1956)
 from the mean of all courses towards these courses improve the tangent (sensor selection: Joshi and Boyd 2009).
 """
 
@@ -82,7 +82,7 @@ def best_of_labels(
 def _tangent(
     valuation: Valuation, label: int, unseen: float, start: Floats, total: Floats, work: ValueWork, slopes: Floats
 ) -> float:
-    """Write the slopes (bernoulli_size,) of a label's term in its sums; returns the value of the tangent at `start`.
+    """Write the slopes (bernoulli_size,) of a label's term in its sums. Returns the value of the tangent at `start`.
 
     unseen: the term without scans. total: (bernoulli_size, 1) where it is touched. inf if the arithmetic fails.
     """
@@ -120,7 +120,7 @@ def _tangent(
 def _best_by_tangent(
     table: Table, cells: Cells, prices: Floats, slopes: Floats, cell_slopes: Floats, num: int, best: Ints
 ) -> float:
-    """Write the course of each sensor that is best by the tangent; returns the sum of their changes less prices.
+    """Write the course of each sensor that is best by the tangent. Returns the sum of their changes less prices.
 
     num: numbers of an information matrix.
     """
@@ -145,7 +145,7 @@ def _best_by_tangent(
 
 @kernel
 def relaxed_bound(table: Table, valuation: Valuation, cells: Cells, prices: Floats) -> float:
-    """Return an upper bound on the expected loss, as a reward, of all joint actions; inf if the arithmetic fails."""
+    """Return an upper bound on the expected loss, as a reward, of all joint actions, or inf if the arithmetic fails."""
     firsts, num_labels, dim, least = table.first_courses, len(table.start), valuation.covs.shape[1], math.inf
     at = Ascent(np.zeros(len(table.powers), np.int64), start_totals(table), np.zeros(len(cells.worth)))
     for s in range(len(at.chosen)):

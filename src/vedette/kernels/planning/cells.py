@@ -51,7 +51,7 @@ def _write_view(
     cells: Ints,
     log_miss: Floats,
 ) -> int:
-    """Write the cells in view on one course, with their values as in `cells_in_view`; returns their number."""
+    """Write the cells in view on one course, with their values as in `cells_in_view`, and return their number."""
     count = 0
     for c in range(len(grid.states)):
         most, total = 0.0, 0.0
@@ -80,13 +80,13 @@ def cells_in_view(
         courses: (num_courses, num_times, pose_dim) poses.
         scans: (num_courses, num_times) whether it scans at each pose.
         states: (num_cells, num_nodes, state_dim) targets at the nodes of each cell.
-        node_weights: (num_nodes,) weights of the mean; sum 1.
-        least: minimum detection probability of a cell that is seen; with 0 all are.
-        reach: m; P_D is known to be 0 at nodes farther than this, so it is not evaluated there; inf: not known.
+        node_weights: (num_nodes,) weights of the mean, sum 1.
+        least: minimum detection probability of a cell that is seen. With 0 all are.
+        reach: m. P_D is known to be 0 at nodes farther than this, so it is not evaluated there. inf: not known.
 
     Returns:
-        entry_offsets (num_courses + 1,); and for each entry the cell, increasing within a course, and the sum of log(1
-            - P_D) over all times of the course; -inf if a detection is certain.
+        entry_offsets (num_courses + 1,), and for each entry the cell, increasing within a course, and the sum of log(1
+            - P_D) over all times of the course, which is -inf if a detection is certain.
     """
     num_cells, count = len(states), 0
     grid = _Cells(states, node_weights, np.empty((num_cells, 4)))

@@ -97,7 +97,7 @@ def _update_cov(
 
 @borrowing
 def _detection(decision: Decision, pose: Floats, mean: Floats, cov: Floats, reach: float, work: _Work) -> float:
-    """Return the detection probability of a Gaussian; nodes beyond `reach`, where P_D is 0, are not evaluated."""
+    """Return the detection probability of a Gaussian. Nodes beyond `reach`, where P_D is 0, are not evaluated."""
     sensor, x, y, squares, num = decision.sensor, work.states[0], work.states[1], work.offsets.squares, 0
     if sensor.detection_rule != BY_NODES:
         return detection_probability(sensor, pose, mean, cov, work.scratch.points[0])
@@ -140,7 +140,7 @@ def _is_seen(
     work: _Work,
     detections: Floats,
 ) -> bool:
-    """Return True if a label's detection probability is at least `least` at some step; writes the probabilities."""
+    """Return True if a label's detection probability is at least `least` at some step. Writes the probabilities."""
     paths, seen = belief.paths, False
     for h in range(len(detections)):
         pose, detections[h] = decision.horizon.poses[course, h], 0.0
@@ -162,7 +162,7 @@ def _expected_cov(
     work: _Work,
     out: Floats,
 ) -> float:
-    """Write the expected covariance at the end of the horizon; returns the log probability of never being detected.
+    """Write the expected covariance at the end of the horizon. Returns the log probability of never being detected.
 
     A scan with a detection probability below `least` gives no information about the state.
     """
@@ -197,7 +197,7 @@ def fill_expected_changes(
     last: int,
     changes: Floats,
 ) -> None:
-    """Write changes (num_entries, bernoulli_size, 1) for courses `first:last`; see `known_association.fill_changes`.
+    """Write changes (num_entries, bernoulli_size, 1) for courses `first:last`. See `known_association.fill_changes`.
 
     They are zero for a label whose detection probability is below `least` at every step, for example beyond `reach`, m.
     P_D is that of the prediction, even if earlier scans of the horizon are expected to have reduced its covariance.

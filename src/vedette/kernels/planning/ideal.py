@@ -89,7 +89,7 @@ def add_noise(sensor: Sensor, state: Floats, pose: Floats, normals: Floats, scra
 
 @inlined
 def ideal_measurement(decision: Decision, action: int, target: int, step: int, scratch: Scratch, out: Floats) -> bool:
-    """Write the ideal measurement of a sampled target at a step of an action; returns False if there is none.
+    """Write the ideal measurement of a sampled target at a step of an action. Returns False if there is none.
 
     IDEAL: without noise, of a target whose detection probability is at least the threshold. EXPECTED: without noise, of
     a target detected at random with its detection probability. SAMPLED: detected likewise, with measurement noise.
@@ -109,7 +109,7 @@ def ideal_measurement(decision: Decision, action: int, target: int, step: int, s
 
 @inlined
 def ideal_scan(decision: Decision, action: int, sample: int, step: int, scratch: Scratch, out: Floats) -> int:
-    """Write the ideal measurements of a sample at a step of an action into `out`; returns their number. No clutter."""
+    """Write the ideal measurements of a sample at a step of an action into `out`. Returns their number. No clutter."""
     futures, count = decision.futures, 0
     for target in range(futures.offsets[sample], futures.offsets[sample + 1]):
         if ideal_measurement(decision, action, target, step, scratch, out[count]):

@@ -18,7 +18,7 @@ from vedette.kernels.planning.label_values import Valuation, ValueWork, make_val
 
 @inlined
 def add_rows(rows: Floats, power: float, changes: Floats, out: Floats) -> None:
-    """Write out = rows + power * changes, each (bernoulli_size, num_samples); `out` may be `rows`."""
+    """Write out = rows + power * changes, each (bernoulli_size, num_samples). `out` may be `rows`."""
     if rows.shape[1] == 1:  # one sample, as for the expected loss: no inner loop
         for k in range(rows.shape[0]):
             out[k, 0] = rows[k, 0] + power * changes[k, 0]
@@ -76,7 +76,7 @@ def values_without_scans(rows: Floats, valuation: Valuation) -> Floats:
 
 @kernel
 def existence_logits(rows: Floats, dim: int) -> Floats:
-    """Return existence logits (num_labels, num_samples) of rows; 0 if no sensor with a positive power has the label."""
+    """Return existence logits (num_labels, num_samples) of rows, or 0 if no sensor of positive power has the label."""
     num_labels, size, num_samples = rows.shape
     out, integrals = np.zeros((num_labels, num_samples)), make_integrals(num_samples)
     for label in range(num_labels):
@@ -127,7 +127,7 @@ def _gather(table: Table, actions: Ints, stale: Bools, touched: Bools, totals: F
 def joint_values(table: Table, valuation: Valuation, actions: Ints, first: int, last: int, out: Floats) -> None:
     """Write sums over labels (num_joint, num, num_samples) of joint actions `first:last`.
 
-    actions: (num_joint, num_sensors) index of the course of each sensor; -1 for a sensor that does not scan. A label
+    actions: (num_joint, num_sensors) index of the course of each sensor, or -1 for a sensor that does not scan. A label
     whose scans are those of the joint action before keeps its values, so joint actions that differ in one sensor cost
     only what that sensor can reach.
     """
@@ -168,7 +168,7 @@ def value_changed(
 def line_values(table: Table, valuation: Valuation, chosen: Ints, first: int, last: int, out: Floats) -> None:
     """Write sums over labels (num_courses, num, num_samples) of each course of sensors `first:last`, others as chosen.
 
-    chosen: (num_sensors,) as a row of `joint_values`; for a sensor's own courses its entry is not read. out: for the
+    chosen: (num_sensors,) as a row of `joint_values`. For a sensor's own courses its entry is not read. out: for the
     courses of all sensors.
     """
     totals, num_labels = start_totals(table), len(table.start)

@@ -121,7 +121,7 @@ def _take_path(belief: Belief, label: int, step: int, num: int, batch: BatchedGa
 def _detect(
     belief: Belief, decision: Decision, course: int, label: int, step: int, first: int, num: int, work: Work
 ) -> int:
-    """Write which of the samples' targets are detected, and their ideal measurements; returns the number detected."""
+    """Write which of the samples' targets are detected, and their ideal measurements. Returns the number detected."""
     sensor, forms, horizon, futures = decision.sensor, decision.forms, decision.horizon, decision.futures
     pose, scratch, offsets, targets = horizon.poses[course, step], work.own.scratch, work.own.offsets, work.targets
     for s in range(num):
@@ -285,7 +285,7 @@ def _follow(
 
 @kernel
 def rows_without_scans(means: Floats, covs: Floats, logits: Floats, references: Floats) -> Floats:
-    """Return Bernoulli rows (num, bernoulli_size) of labels with one Gaussian each; their logits are limited."""
+    """Return Bernoulli rows (num, bernoulli_size) of labels with one Gaussian each. Their logits are limited."""
     num, dim = means.shape
     rows, factor, inverse = np.empty((num, bernoulli_size(dim))), np.empty((dim, dim)), np.empty((dim, dim))
     for i in range(num):

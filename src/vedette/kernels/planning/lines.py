@@ -27,7 +27,7 @@ def _side(ax: float, ay: float, bx: float, by: float, cx: float, cy: float) -> f
 
 @inlined
 def _touched_at(ax: float, ay: float, bx: float, by: float, edges: Edges, e: int) -> float:
-    """Return the fraction of the line from a to b at which it touches an edge; inf if it does not."""
+    """Return the fraction of the line from a to b at which it touches an edge, or inf if it does not."""
     cx, cy, dx, dy = edges.starts[e, 0], edges.starts[e, 1], edges.ends[e, 0], edges.ends[e, 1]
     if max(ax, bx) < min(cx, dx) or max(cx, dx) < min(ax, bx) or max(ay, by) < min(cy, dy) or max(cy, dy) < min(ay, by):
         return math.inf
@@ -40,7 +40,7 @@ def _touched_at(ax: float, ay: float, bx: float, by: float, edges: Edges, e: int
 
 @kernel
 def clear_lengths(starts: Floats, ends: Floats, edges: Edges) -> Floats:
-    """Return lengths (num_starts, num_ends) m of straight lines; inf for those that touch an edge."""
+    """Return lengths (num_starts, num_ends) m of straight lines, or inf for those that touch an edge."""
     found = np.empty((len(starts), len(ends)))
     for i in range(len(starts)):
         for j in range(len(ends)):
@@ -55,7 +55,7 @@ def clear_lengths(starts: Floats, ends: Floats, edges: Edges) -> Floats:
 
 @kernel
 def first_touches(starts: Floats, ends: Floats, edges: Edges, ignored: Bools) -> Floats:
-    """Return the fraction (num,) of the line from each start to its end at which it first touches an edge; inf: never.
+    """Return the fraction (num,) of the line from each start to its end at which it first touches an edge. inf: never.
 
     ignored: (num, num_zones) zones whose edges do not count for a line.
     """

@@ -1,8 +1,8 @@
 """Pseudo-updates of a GLMB: the filter's own step for every action and sample of a decision (paper, Algorithm 2).
 
-A case is one action of one sensor with one sample; case `action * num_samples + sample`. The kernels are those of
+A case is one action of one sensor with one sample: case `action * num_samples + sample`. The kernels are those of
 `vedette.kernels.steps.glmb`, in arrays that are kept from case to case. The differences: no target is born or dies, so
-that every joint association is a separate hypothesis; the samples of an action share the first prediction; and every
+that every joint association is a separate hypothesis. The samples of an action share the first prediction, and every
 case keeps all label sets of the prior, so that all cases and the prediction have the same support.
 """
 
@@ -39,7 +39,7 @@ class GlmbResults(NamedTuple):
 
 @inlined
 def _find_children(options: Options, belief: CaseBelief, caps: SearchCaps, work: GlmbWork) -> bool:
-    """Write the heaviest children, and the best of each label set; returns False if the capacity is too small."""
+    """Write the heaviest children, and the best of each label set. Returns False if the capacity is too small."""
     return (
         start_search(options, belief.hyps, work.search, work.children)
         and run_search(options, belief.hyps, caps, work.search, work.children)
@@ -64,7 +64,7 @@ def _posterior(options: Options, belief: CaseBelief, rows: Rows, work: GlmbWork,
 def _update_cases(
     prior: CaseBelief, decision: Decision, first: int, last: int, results: GlmbResults, work: GlmbWork
 ) -> int:
-    """Update cases `first:last`; returns `last`, or the case before which `work` must be grown."""
+    """Update cases `first:last`. Returns `last`, or the case before which `work` must be grown."""
     sensor, horizon, caps = decision.sensor, decision.horizon, decision.truncation
     num_samples, prepared = len(decision.futures.offsets) - 1, -1
     for case in range(first, last):
@@ -102,7 +102,7 @@ def _update_cases(
 def _write_marginal(belief: CaseBelief, results: GlmbResults, case: int, work: GlmbWork) -> None:
     """Write the belief marginalised over association histories: a log weight per label set, one Gaussian per member.
 
-    Paper eq. 10: w(L) = sum of the weights of L's hypotheses; each member is the mixture of its tracks, with these
+    Paper eq. 10: w(L) = sum of the weights of L's hypotheses. Each member is the mixture of its tracks, with these
     weights.
     """
     set_offsets, log_weights, hyps, groups = results.set_offsets, results.log_weights[case], belief.hyps, belief.groups

@@ -1,6 +1,6 @@
 """Pseudo-updates of an LMB: the filter's own step for every action and sample of a decision.
 
-A case is one action of one sensor with one sample; case `action * num_samples + sample`. The kernels are those of
+A case is one action of one sensor with one sample: case `action * num_samples + sample`. The kernels are those of
 `vedette.kernels.steps.lmb`, in arrays that are kept from case to case. The differences: no label is born, dies or is
 dropped, and the samples of an action share the first prediction.
 """
@@ -107,7 +107,7 @@ def _update_cases(
     results: LmbResults,
     work: LmbWork,
 ) -> int:
-    """Update cases `first:last`; returns `last`, or the case before which `work` must be grown."""
+    """Update cases `first:last`. Returns `last`, or the case before which `work` must be grown."""
     sensor, horizon, caps, belief = decision.sensor, decision.horizon, decision.truncation, work.belief
     num_samples, prepared, updated = len(decision.futures.offsets) - 1, -1, belief.tracks.components
     for case in range(first, last):

@@ -34,9 +34,9 @@ def make_naming(num_options: int) -> Naming:
 
 @inlined
 def write_updated(row: int, option: int, rows: Rows, options: Options, start: int, out: Mixture) -> int:
-    """Write the updated components of a row under one of its options from `start` on; return the end.
+    """Write the updated components of a row under one of its options from `start` on, and return the end.
 
-    Their log weights sum to the option's own; components outside the gate are left out.
+    Their log weights sum to the option's own. Components outside the gate are left out.
     """
     first, entry = rows.offsets[row], options.entries[option]
     detected, predicted = options.columns[option] != MISSED, rows.components
@@ -92,7 +92,7 @@ def name_tracks(
 
 @borrowing
 def update_tracks(naming: Naming, num_tracks: int, rows: Rows, options: Options, out: Tracks) -> int:
-    """Write the named tracks with normalised mixtures; return the number of components."""
+    """Write the named tracks with normalised mixtures, and return the number of components."""
     filled, components = 0, out.components
     out.offsets[0] = 0
     for i in range(num_tracks):

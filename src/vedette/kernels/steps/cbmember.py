@@ -1,6 +1,6 @@
 """The cardinality-balanced multi-Bernoulli filter: one step of Gaussian-mixture Bernoullis (Vo, Vo, Cantoni 2009).
 
-Bernoullis are stored as an LMB with meaningless labels; they are the rows of a scan as those of an LMB are.
+Bernoullis are stored as an LMB with meaningless labels. They are the rows of a scan as those of an LMB are.
 """
 
 from __future__ import annotations
@@ -56,7 +56,7 @@ def list_choices(options: Options, num_measurements: int) -> Choices:
 
 @kernel
 def existence_logits(rows: Rows, options: Options, choices: Choices) -> Floats:
-    """Existence logit of every legacy Bernoulli, one per row, and then of one per measurement; -inf if there is none.
+    """Existence logit of every legacy Bernoulli, one per row, and then of one per measurement, or -inf if none.
 
     With a = 1 - r, m = r <p, 1 - pD> and o_z = r <p, pD g_z> / kappa(z) of each row, 1 - r <p, pD> is a + m, and
     legacy odds are m / a, those of a measurement (sum of o a / (a + m)^2) / (1 + sum of o m / (a + m)^2): the paper's

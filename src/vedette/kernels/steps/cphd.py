@@ -167,7 +167,7 @@ def _log_mean(log_cardinality: Floats) -> float:
 
 @kernel
 def _predict(log_cardinality: Floats, prior: Mixture, birth: Lmb, rows_log_weights: Floats, log_died: float) -> Floats:
-    """Return the predicted cardinality; scale the row's weights, with survivors of one target, to sum to one."""
+    """Return the predicted cardinality, and scale the row's weights, with survivors of one target, to sum to one."""
     num = len(prior.log_weights)
     predicted = predict_cardinality(log_cardinality, log_sum(rows_log_weights[:num]), log_died, birth.existence_logit)
     log_prior_mean = _log_mean(log_cardinality)

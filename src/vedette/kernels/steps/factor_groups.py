@@ -95,7 +95,7 @@ def weigh_singles(prior: FactoredGlmb, rows: Rows) -> None:
 
 @kernel
 def presence_of_rows(prior: FactoredGlmb, num_rows: int) -> Floats:
-    """Probability of each row in its factor, shape (num_rows,); 1 for a single row, whose options include absence."""
+    """Probability of each row in its factor, shape (num_rows,), or 1 for a single row (options include absence)."""
     presence = np.ones(num_rows)
     for factor in range(len(prior.factor_offsets) - 1):
         first, last = prior.track_offsets[factor], prior.track_offsets[factor + 1]

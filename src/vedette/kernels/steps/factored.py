@@ -1,7 +1,7 @@
 """Joint prediction and update of a factored density: every group of linked factors as a small delta-GLMB.
 
 Factors that may take the same measurements (`vedette.kernels.association.links`) are multiplied out and updated
-jointly, by the kernels of the delta-GLMB; factors without competition are updated alone, a single track as in an LMB.
+jointly, by the kernels of the delta-GLMB. Factors without competition are updated alone, a single track as in an LMB.
 Then each group splits into the smallest parts that are independent within a given L1 error
 (`vedette.kernels.labelled.splitting`), and a part of one label becomes one track again, the mixture of its versions.
 """

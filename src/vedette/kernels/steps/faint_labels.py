@@ -67,7 +67,7 @@ def _site_density(sites: Floats, c: int, x: float, y: float, cov: Floats) -> tup
 
 @borrowing
 def _cell_of(background: Background, place: Floats) -> int:
-    """Return the index of the cell of a place; -1 outside of the region, or without one."""
+    """Return the index of the cell of a place, or -1 outside of the region, or without one."""
     grid = background.grid
     return cell_at(place[0], place[1], grid[0], grid[1], grid[2], grid[3], int(grid[4]), len(background.table))
 
@@ -93,7 +93,7 @@ def outweighs_undetected(existence: float, mean: Floats, cov: Floats, background
 
 @borrowing
 def _nearest_site(background: Background, mean: Floats, cov: Floats) -> tuple[int, float]:
-    """Return which component has the largest density at a Gaussian, and that density; -1 if all are far."""
+    """Return which component has the largest density at a Gaussian, and that density, or -1 if all are far."""
     best, largest = -1, 0.0
     for c in range(len(background.sites)):
         density, _ = _site_density(background.sites, c, mean[0], mean[1], cov)
@@ -104,14 +104,14 @@ def _nearest_site(background: Background, mean: Floats, cov: Floats) -> tuple[in
 
 @kernel
 def with_returned(intensity: Mixture, tables: Floats, background: Background, returned: Mixture) -> Mixture:
-    """Return the intensity with further Gaussians; in a region, their expected numbers are added to its cells.
+    """Return the intensity with further Gaussians. In a region, their expected numbers are added to its cells.
 
-    A Gaussian near a component is merged with it, with the moments of both; far ones become components. The total
+    A Gaussian near a component is merged with it, with the moments of both. Far ones become components. The total
     expected number grows by theirs.
 
     Args:
         intensity: undetected targets after the scan, by the components of the background.
-        tables: (num_tables, num_cells) as in `Undetected`, after the scan; the first is written.
+        tables: (num_tables, num_cells) as in `Undetected`, after the scan. The first is written.
         background: undetected targets before the scan.
         returned: the Gaussians, weighted by their expected numbers.
     """

@@ -26,7 +26,7 @@ _NOTHING = 2.0**-54  # negligible next to 1
 
 @kernel
 def _least_log_clutter(scan: ScanInput, sensor: Sensor, floor: float) -> float:
-    """Return the least log clutter intensity at the measurements over the ratio of classes; inf if there are none."""
+    """Return the least log clutter intensity at the measurements over the ratio of classes, or inf without any."""
     least = math.inf
     for j in range(len(scan.measurements)):
         measurement = scan.measurements[j]
@@ -41,7 +41,7 @@ def _may_change(
 ) -> bool:
     """Return True if the scan may change a component.
 
-    The bound on the likelihood of a measurement is the peak of the measurement noise alone; measurements that bring
+    The bound on the likelihood of a measurement is the peak of the measurement noise alone. Measurements that bring
     their noise have no bound.
     """
     mean, noise = tracks.components.means[c], scratch.measurement_noise
@@ -99,7 +99,7 @@ def _copy(source: Tracks, i: int, out: Tracks, num: int) -> None:
 
 @kernel
 def _copy_reduced(source: Tracks, i: int, caps: MixtureCaps, out: Tracks, num: int) -> bool:
-    """Apply `_copy` with reduction; return True if all components were kept, so that nothing remains to be reduced."""
+    """Apply `_copy` with reduction. Return True if all components were kept, so that nothing remains to be reduced."""
     _copy(source, i, out, num)
     first, end = out.offsets[num], out.offsets[num + 1]
     if end - first == 1:
@@ -113,7 +113,7 @@ def _copy_reduced(source: Tracks, i: int, caps: MixtureCaps, out: Tracks, num: i
 
 @kernel
 def merge_updated(prior: Lmb, marks: Bools, updated: Lmb, caps: MixtureCaps, settled: Bools) -> tuple[Lmb, Bools]:
-    """Return the prior with its marked tracks as in `updated`, or dropped if they are not in it; in label order.
+    """Return the prior with its marked tracks as in `updated`, or dropped if they are not in it, in label order.
 
     Mixtures of the other tracks are reduced as by an update without effect, which may merge results of the last one.
     The `settled` tracks, whose reduction has no effect, are skipped. Also returns the tracks that are settled now.

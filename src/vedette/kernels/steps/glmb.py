@@ -8,7 +8,7 @@ detected. Its weight is the prior one's times those of the options,
                                P(present) <p+, p_D g(z | .)> / kappa(z)        if it is detected as z,
 
 relative to the weight of all measurements being clutter. A planner runs the same kernels in its own workspace
-(`vedette.kernels.planning.pseudo_glmb`); a filter adds births, and the choice of the children to keep.
+(`vedette.kernels.planning.pseudo_glmb`). A filter adds births, and the choice of the children to keep.
 """
 
 from __future__ import annotations
@@ -100,7 +100,7 @@ def _associate(
 def kept_children(
     labels: Ints, options: Options, parents: Parents, children: Children, truncation: Truncation, is_covered: bool
 ) -> tuple[Children, Ints]:
-    """Return the children, each hypothesis once, with the best of every association; and those to keep, heaviest first.
+    """Return the children, each hypothesis once, with the best of every association, and those to keep, heaviest first.
 
     labels: (num_rows, 2) of the rows. is_covered: True if nothing that `max_track_gap` would keep has been left out.
     """

@@ -1,6 +1,6 @@
 """Joint prediction and update of an LMB density (Reuter, Vo, Vo, Dietmayer 2014), with exact association marginals.
 
-The update of an LMB is a GLMB; it is projected to the LMB of the same existence probabilities and track moments. Both
+The update of an LMB is a GLMB. It is projected to the LMB of the same existence probabilities and track moments. Both
 are sums over the options of a row weighted by their marginal probabilities, so that the GLMB itself is never listed:
 
     r+ = sum over the options but absence of P(option),   p+ = sum of P(option) p(x | option) / r+.
@@ -173,7 +173,7 @@ def _reduced_tracks(kept: Ints, rows: Rows, options: Options, marginals: Floats,
 
 @borrowing
 def append_reduced(wide: Mixture, width: int, caps: MixtureCaps, work: ReductionWork, out: Mixture, filled: int) -> int:
-    """Append the first `width` components, reduced and with weights normalised to one; return the new end."""
+    """Append the first `width` components, reduced and with weights normalised to one, and return the new end."""
     if width == 1 and wide.log_weights[0] > -math.inf:
         # A single component needs no reduction: most births, which have no measurements.
         copy_component(wide, 0, out, filled)

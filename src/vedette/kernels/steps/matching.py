@@ -35,7 +35,7 @@ def make_mixture(num_entries: int, state_dim: int) -> MixtureRoom:
 
 @inlined
 def _gather(row: int, rows: Rows, options: Options, marginals: Floats, out: MixtureRoom) -> int:
-    """Write weights and updated means of the components that may be present; return their number."""
+    """Write weights and updated means of the components that may be present, and return their number."""
     first, last, count, peak = rows.offsets[row], rows.offsets[row + 1], 0, -math.inf
     for option in range(options.offsets[row], options.offsets[row + 1]):
         if options.columns[option] != ABSENT:
@@ -69,7 +69,7 @@ def _gather(row: int, rows: Rows, options: Options, marginals: Floats, out: Mixt
 
 @inlined
 def _gather_predicted(row: int, rows: Rows, out: MixtureRoom) -> int:
-    """Write the components as predicted, all with the same weight; return their number."""
+    """Write the components as predicted, all with the same weight, and return their number."""
     first, last = rows.offsets[row], rows.offsets[row + 1]
     for c in range(first, last):
         out.weights[c - first], out.sources[c - first] = 1.0, 3 * c + PREDICTED
@@ -82,7 +82,7 @@ def _gather_predicted(row: int, rows: Rows, out: MixtureRoom) -> int:
 def _moments(
     count: int, rows: Rows, options: Options, mixture: MixtureRoom, out_mean: Floats, out_cov: Floats, n: int
 ) -> None:
-    """Write the mean and covariance of the first `count` components; their means become deviations from the mean."""
+    """Write the mean and covariance of the first `count` components. Their means become deviations from the mean."""
     weights, means, sources = mixture.weights, mixture.means, mixture.sources
     total = 0.0
     for k in range(count):

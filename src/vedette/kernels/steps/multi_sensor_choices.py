@@ -18,7 +18,7 @@ _BITS = 31  # bits of a mask in one word, so that words hash without overflow
 class Choices(NamedTuple):
     """Choices of each track: `offsets[t]:offsets[t + 1]` for track `t`, and absence.
 
-    columns: (num_choices, num_sensors) measurements taken, numbered over all sensors; negative: none.
+    columns: (num_choices, num_sensors) measurements taken, numbered over all sensors. Negative: none.
     log_weights: (num_choices,). log_absent: (num_tracks,).
     """
 
@@ -53,7 +53,7 @@ def _root(leaders: Ints, track: int) -> int:
 def find_clusters(choices: Choices, num_columns: int) -> tuple[Ints, Ints]:
     """Return the leader of each track's cluster, and the contested measurements.
 
-    leaders: (num_tracks,) a track of the same cluster, not after the track itself; the first one is its own leader.
+    leaders: (num_tracks,) a track of the same cluster, not after the track itself. The first one is its own leader.
     contested: (num_columns,) 1 if more than one track may take the measurement.
     """
     num_tracks = len(choices.log_absent)

@@ -28,7 +28,7 @@ def _likely_choices(combinations: Combinations, log_least_odds: float) -> tuple[
     """Return the choices of every track, without measured ones that are surely less probable than a bound.
 
     For each joint choice with a combination of weight w, there is one with a combination of weight v in which the track
-    takes no measurement; so the probability of the former is at most w / (v + w). Also returns the combination of each
+    takes no measurement, so the probability of the former is at most w / (v + w). Also returns the combination of each
     choice, and the log of a lower bound on the retained share of weight.
     """
     rows, num_tracks, num = combinations.rows, len(combinations.log_absent), len(combinations.tracks)
@@ -56,7 +56,7 @@ def _likely_choices(combinations: Combinations, log_least_odds: float) -> tuple[
 
 @kernel
 def _logits(choices: Choices, marginals: Floats, absent: Floats) -> Floats:
-    """Return the log odds of each track's existence; -inf if it cannot exist."""
+    """Return the log odds of each track's existence, or -inf if it cannot exist."""
     logits = np.empty(len(absent))
     for track in range(len(absent)):
         present = -math.inf
@@ -109,7 +109,7 @@ def _reduced_tracks(
 def lmb_of_combinations(
     combinations: Combinations, num_columns: int, truncation: Truncation, reduction: Reduction
 ) -> tuple[Lmb, LmbReport]:
-    """Associate, marginalise and reduce the combinations; the caller accounts for clutter.
+    """Associate, marginalise and reduce the combinations. The caller accounts for clutter.
 
     num_columns: number of measurements of all sensors. A track that cannot exist has no density, and is always dropped.
     """
@@ -133,7 +133,7 @@ def lmb_of_combinations(
 def update_lmb(
     combinations: Combinations, scan: ScanInput, sensor: Sensor, truncation: Truncation, reduction: Reduction
 ) -> tuple[Lmb, LmbReport]:
-    """Return the LMB after one sensor's scan; `combinations` are those before the scan, at its time."""
+    """Return the LMB after one sensor's scan. `combinations` are those before the scan, at its time."""
     taken, seen = extend_combinations(combinations, 0, 0, scan, sensor, truncation)
     posterior, report = lmb_of_combinations(taken, len(scan.measurements), truncation, reduction)
     sums = MarginalSums(report.sums.log_total, report.sums.num_ranked, report.sums.log_kept + seen.log_kept)

@@ -95,7 +95,7 @@ def _advance(classes: Classes, member: int, states: States) -> tuple[States, Int
 
 @inlined
 def _part_of(masks: Ints, num: int, mask: Ints) -> int:
-    """Return the first of `num` sets that is a subset of `mask`; -1: none."""
+    """Return the first of `num` sets that is a subset of `mask`. -1: none."""
     for place in range(num):
         is_part = True
         for word in range(len(mask)):
@@ -144,7 +144,7 @@ def _keep_heaviest(states: States, targets: Ints, caps: StateCaps) -> States:
 
 @kernel
 def _backward(classes: Classes, starts: Ints, forward: States, targets: Ints, out: Floats) -> float:
-    """Write the log of the sum of all joint choices that hold each class; return the log of a bound on their error."""
+    """Write the log of the sum of all joint choices that hold each class. Return the log of a bound on their error."""
     amiss, amiss_at_most, last = -math.inf, -math.inf, len(targets)
     after = np.zeros((1, 2))
     for member in range(len(starts) - 2, -1, -1):
@@ -171,7 +171,7 @@ def _backward(classes: Classes, starts: Ints, forward: States, targets: Ints, ou
 
 @kernel
 def _append(forward: States, filled: int, states: States) -> States:
-    """Return `forward` with the states of one more member from `filled` on; their masks are no longer needed."""
+    """Return `forward` with the states of one more member from `filled` on. Their masks are no longer needed."""
     num = len(states.log_weights)
     log_weights, log_lent = forward.log_weights, forward.log_lent
     if filled + num > len(log_weights):

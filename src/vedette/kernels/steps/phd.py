@@ -1,7 +1,7 @@
 """The Gaussian-mixture PHD filter (Vo and Ma 2006), and the parts that it shares with the CPHD filter.
 
 An intensity is predicted and updated as the single row of a scan: its components are the surviving ones followed by the
-birth sites; its options are a miss or a detection as one of the gated measurements, and never absence.
+birth sites. Its options are a miss or a detection as one of the gated measurements, and never absence.
 """
 
 from __future__ import annotations
@@ -54,7 +54,7 @@ def predict_intensity(prior: Mixture, scan: ScanInput, motion: Motion | None, se
 
 @kernel
 def corrected_intensity(rows: Rows, options: Options, log_factors: Floats, caps: MixtureCaps) -> Mixture:
-    """Return the components of every option times the option's factor, reduced; their total weight is preserved.
+    """Return the components of every option times the option's factor, reduced. Their total weight is preserved.
 
     log_factors: (>= num_options,) log of the factor of each option.
     """

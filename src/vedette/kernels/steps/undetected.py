@@ -86,7 +86,7 @@ def _take_out(sensor: Sensor, pose: Floats, states: Floats, node_weights: Floats
 def take_out_detected(sensor: Sensor, pose: Floats, states: Floats, node_weights: Floats, tables: Floats) -> Floats:
     """Tables times the mean over each cell of 1 - P_D, shape (num_tables, num_cells).
 
-    states: (num_cells, num_nodes, state_dim) of targets at the nodes of each cell; node_weights: (num_nodes,), sum 1.
+    states: (num_cells, num_nodes, state_dim) of targets at the nodes of each cell. node_weights: (num_nodes,), sum 1.
     """
     out = tables.copy()
     _take_out(sensor, pose, states, node_weights, out)
@@ -106,7 +106,7 @@ def survival_probabilities(motion: Motion, dt: float, states: Floats) -> Floats:
 
 @borrowing
 def _spread(row: Floats, shares: Floats, out: Floats) -> None:
-    """Distribute each number of a row to its neighbours on both sides (-> out); what leaves the row is lost."""
+    """Distribute each number of a row to its neighbours on both sides (-> out). What leaves the row is lost."""
     for i in range(len(row)):
         out[i] = row[i] * shares[0]
         for offset in range(1, len(shares)):
@@ -170,7 +170,7 @@ def predicted_undetected(before: Undetected, motion: Motion, dt: float, arrivals
 def cell_at(
     x: float, y: float, corner_x: float, corner_y: float, width: float, height: float, num_columns: int, num_cells: int
 ) -> int:
-    """Return the index of the cell of a place; -1 outside of the region."""
+    """Return the index of the cell of a place, or -1 outside of the region."""
     if num_cells == 0:
         return -1
     column, row = np.floor((x - corner_x) / width), np.floor((y - corner_y) / height)
@@ -181,7 +181,7 @@ def cell_at(
 
 @borrowing
 def _density_at(place: Floats, cells: Cells, table: Floats) -> float:
-    """Return targets per square metre; 0 outside of the region."""
+    """Return targets per square metre, or 0 outside of the region."""
     corner, size = cells.corner, cells.size
     cell = cell_at(place[0], place[1], corner[0], corner[1], size[0], size[1], cells.num_columns, len(table))
     return float(table[cell] / (size[0] * size[1])) if cell >= 0 else 0.0
@@ -189,7 +189,7 @@ def _density_at(place: Floats, cells: Cells, table: Floats) -> float:
 
 @kernel
 def intensity_at_places(undetected: Undetected) -> Mixture:
-    """Gaussians (num_measurements,) of the targets in the cells about each measurement; none without tables."""
+    """Gaussians (num_measurements,) of the targets in the cells about each measurement, or none without tables."""
     num, dim = len(undetected.places) if len(undetected.tables) > 0 else 0, len(undetected.std)
     std, out = undetected.std.copy(), make_components(num, dim, undetected.marks)
     std[:2] *= WIDE
