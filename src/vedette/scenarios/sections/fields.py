@@ -72,7 +72,7 @@ def _is_positive(value: object) -> bool:
 
 
 class ScenarioFields(Section):
-    """The fields of a scenario, each checked by itself; `ScenarioModel` also checks that they go together."""
+    """The fields of a scenario, each checked by itself. `ScenarioModel` also checks that they go together."""
 
     format: Literal[1] = Field(default=1, description="Version of this format [-].")
     name: Name = Field(description="Short name [-].")

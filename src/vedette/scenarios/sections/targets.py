@@ -84,7 +84,7 @@ class ScriptedTargets(Section):
         return float(np.cumsum(changes)[: num_steps + 1].max())
 
     def build(self, motion: MotionModel, order: list[int], times: Floats, region: Region) -> ScriptedSource:
-        """Return the targets, moved by `motion`; order: of the components of its states in those of the section."""
+        """Return the targets, moved by `motion`, whose states have the section's components in this order."""
         from vedette.simulation import ScriptedTargets
 
         tracks = self.tracks
@@ -218,7 +218,7 @@ class PoissonTargets(Section):
         return self.expected * (1.0 - (1.0 - self.death_probability) ** num_steps) / self.death_probability
 
     def build(self, motion: MotionModel, order: list[int], times: Floats, region: Region) -> PoissonSource:
-        """Return the targets, moved by `motion`; order: of the components of its states in those of the section."""
+        """Return the targets, moved by `motion`, whose states have the section's components in this order."""
         from vedette.simulation import PoissonTargets
 
         mean, std = np.array(self.mean)[order], np.array(self.std)[order]
