@@ -63,9 +63,10 @@ def test_no_file_imports_what_imports_it() -> None:
     order.prepare()  # raises CycleError, which names the files
 
 
-def test_no_file_of_control_does_so_for_a_type_either() -> None:
+@pytest.mark.parametrize("package", ["vedette.control", "vedette.scenarios"])
+def test_no_file_of_these_does_so_for_a_type_either(package: str) -> None:
     graph = grimp.build_graph("vedette", cache_dir=None)
-    names = graph.find_descendants("vedette.control")
+    names = graph.find_descendants(package) | {package}
     imports = {name: graph.find_modules_directly_imported_by(name) & names for name in names}
     TopologicalSorter(imports).prepare()
 

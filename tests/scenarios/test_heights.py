@@ -22,7 +22,7 @@ from vedette.recorded.tables import Table
 from vedette.scenarios import load_scenario
 from vedette.scenarios.from_recording import scenario_from_recording, scenario_from_sensors
 from vedette.scenarios.loading import Scenario, parse_scenario
-from vedette.scenarios.sections.recording import recorded_sensors
+from vedette.scenarios.recorded_data import recorded_sensors
 from vedette.scenarios.sensors_file import check_sensors_file
 
 SOLID = [kind for kind in KINDS if kind != "bearing_range"]

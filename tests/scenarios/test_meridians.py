@@ -19,7 +19,7 @@ from vedette.recorded import Conventions, Origin, RecordedSensor, as_table, pars
 from vedette.scenarios import load_scenario
 from vedette.scenarios.from_recording import scenario_from_recording, scenario_from_sensors
 from vedette.scenarios.overrides import replace_fields
-from vedette.scenarios.sections.recording import recorded_sensors
+from vedette.scenarios.recorded_data import recorded_sensors
 
 FAR = Origin(-1.05, 50.7)
 RADARS = {"A": (-1.05, 50.7), "B": (0.35, 50.7)}  # 98.9 km apart on one latitude

@@ -25,7 +25,7 @@ from vedette.scenarios import Scenario, parse_scenario
 from vedette.scenarios.build import build_experiment, build_planner, build_sensors
 from vedette.scenarios.calibration import build_problem
 from vedette.scenarios.from_recording import scenario_from_recording, scenario_from_sensors
-from vedette.scenarios.sections.recording import recorded_sensors
+from vedette.scenarios.recorded_data import recorded_sensors
 from vedette.simulation import simulate
 
 KNOT = 1852.0 / 3600.0  # m/s

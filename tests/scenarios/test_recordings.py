@@ -26,7 +26,7 @@ from vedette.scenarios import load_scenario
 from vedette.scenarios.dumping import dump_scenario
 from vedette.scenarios.from_recording import scenario_from_recording
 from vedette.scenarios.overrides import replace_fields
-from vedette.scenarios.sections.recording import recorded_sensors
+from vedette.scenarios.recorded_data import recorded_sensors
 
 SITES = (
     RecordedSensor("north", "bearing_range", (0.0, 0.0, 0.0)),

@@ -22,8 +22,8 @@ from vedette.recorded.tables import Table
 from vedette.recorded.turns import found_turn, swept
 from vedette.scenarios import load_scenario
 from vedette.scenarios.from_recording import scenario_from_recording, scenario_from_sensors
+from vedette.scenarios.recorded_data import recorded_sensors
 from vedette.scenarios.recording_warnings import recording_warnings
-from vedette.scenarios.sections.recording import recorded_sensors
 
 
 @pytest.mark.parametrize(("period", "clockwise", "num_radars"), [(2.5, True, 1), (4.0, False, 2), (12.0, True, 2)])

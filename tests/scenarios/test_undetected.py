@@ -18,7 +18,8 @@ from vedette.models import CellGrid, Region, UndetectedModel
 from vedette.scenarios import Scenario, parse_scenario
 from vedette.scenarios.build import build_experiment
 from vedette.scenarios.dumping import dump_scenario
-from vedette.scenarios.sections.undetected import MAX_CELLS, UndetectedSection
+from vedette.scenarios.sections.undetected import UndetectedSection
+from vedette.scenarios.sections.undetected_intensity import MAX_CELLS
 from vedette.scenarios.summary import summary_rows
 from vedette.scenarios.warnings import scenario_warnings
 from vedette.simulation.loop import run_stream

@@ -17,6 +17,7 @@ from vedette.recorded import RecordedTargets, as_table
 from vedette.recorded.reports import parse_reports
 from vedette.scenarios import load_scenario
 from vedette.scenarios.dumping import dump_stored
+from vedette.scenarios.recorded_data import recorded_targets
 
 START = 1591570800
 # In the order of the tables of state vectors.
@@ -148,7 +149,7 @@ sensors: [{{position: [0, 0]}}]
     (tmp_path / "air.yaml").write_text(text, "utf-8")
     scenario = load_scenario(tmp_path / "air.yaml")
     model: Any = scenario.model
-    assert len(model.targets.source(model, scenario.folder).tracks) == 2
+    assert len(recorded_targets(model, scenario.folder).tracks) == 2
     (tmp_path / "kept.yaml").write_text(dump_stored(scenario), "utf-8")
     kept: Any = load_scenario(tmp_path / "kept.yaml").model.targets
     assert kept.sha256 == hashlib.sha256(file.read_bytes()).hexdigest()

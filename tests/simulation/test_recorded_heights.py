@@ -17,6 +17,7 @@ from vedette.evaluation import track_recording
 from vedette.recorded import RecordedTargets
 from vedette.scenarios import load_scenario
 from vedette.scenarios.from_recording import scenario_from_recording
+from vedette.scenarios.recorded_data import recorded_targets
 
 REPORTS: dict[str, Any] = {
     "time": [0.0, 10.0, 30.0],
@@ -94,7 +95,7 @@ def test_sensors_of_heights_measure_recorded_targets_that_have_them(tmp_path: Pa
         "     noise: {kind: constant, std: [0.001, 10.0, 10.0]}}\n"
     )
     scenario = load_scenario(tmp_path / "scenario.yaml")
-    assert scenario.model.targets.source(scenario.model, tmp_path).with_height  # type: ignore[union-attr]
+    assert recorded_targets(scenario.model, tmp_path).with_height
 
 
 def test_the_replay_of_a_recording_has_heights(tmp_path: Path) -> None:

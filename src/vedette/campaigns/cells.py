@@ -20,7 +20,6 @@ from vedette.scenarios.build import build_planner
 from vedette.scenarios.dumping import dump_scenario, scenario_files
 from vedette.scenarios.overrides import replace_fields
 from vedette.scenarios.sections import ScenarioModel
-from vedette.scenarios.sections.planners import describe_strategy
 
 _LONGEST_NAME = 120
 _SECTIONS = {"filter": "filter.kind", "fusion": "fusion.kind"}
@@ -45,7 +44,7 @@ class Cell:
     @property
     def words(self) -> str:
         """Description of the strategy, such as `joint decisions, expected loss`."""
-        return describe_strategy(self.scenario.model, self.planner)
+        return self.scenario.model.describe_strategy(self.planner)
 
 
 @dataclass(frozen=True, slots=True, repr=False)

@@ -43,10 +43,8 @@ def print_run(record: RunRecord, scenario: Scenario | None, fit: Fit | None = No
 
 def _title(record: RunRecord, scenario: Scenario | None) -> str:
     """Return the title: scenario, planner, seed, run and number of scans (for a recording only scenario and scans)."""
-    from vedette.scenarios.sections.planners import describe_strategy
-
     scans = pluralise(record.num_scans, "scan")
-    words = describe_strategy(scenario.model, record.planner) if scenario else ""
+    words = scenario.model.describe_strategy(record.planner) if scenario else ""
     if record.recording is not None or (scenario is not None and scenario.model.recording is not None):
         return f"{record.scenario}: {scans}"
     planner = f"planner {record.planner}{f' ({words})' if words else ''}"

@@ -22,7 +22,7 @@ from vedette.internal.text import pluralise
 from vedette.kernels.base.types import Ints
 from vedette.recorded.stationary import stationary_places
 from vedette.scenarios import Scenario
-from vedette.scenarios.sections.recording import recorded_sensors, returns_models
+from vedette.scenarios.recorded_data import recorded_scans, recorded_sensors, returns_models
 from vedette.simulation.records import RunRecord
 
 NOTHING = "nothing, as no track spans two scans"
@@ -119,8 +119,7 @@ def fit_of(instants: Sequence[Compared], assumed: Assumed, times: Sequence[Array
 def _stationary_findings(scenario: Scenario) -> Iterator[Finding]:
     """Yield findings of places that a sensor measures all through a recording."""
     model = scenario.model
-    assert model.recording is not None
-    recording = model.recording.build(model, scenario.folder)
+    recording = recorded_scans(model, scenario.folder)
     for s, (site, own) in enumerate(zip(recorded_sensors(model), returns_models(model), strict=True)):
         places, masks = stationary_places(recording, s, site, own)
         if len(places) >= _MANY_PLACES:

@@ -7,6 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from vedette.scenarios import Scenario
+from vedette.scenarios.recorded_data import recorded_scans, recorded_targets
 from vedette.simulation.records import RunRecord
 
 
@@ -30,9 +31,9 @@ def recording_metadata(record: RunRecord, scenario: Scenario) -> RecordingMetada
     model = scenario.model
     start, is_utc, names = 0.0, False, tuple[str, ...]()
     if model.recording is not None:
-        recording = model.recording.build(model, scenario.folder)
+        recording = recorded_scans(model, scenario.folder)
         if np.array_equal(recording.times[: record.num_scans], record.times):
             start, is_utc = recording.start, recording.is_utc
     if model.targets.kind == "recorded":
-        names = tuple(str(track.name) for track in model.targets.source(model, scenario.folder).tracks)
+        names = tuple(str(track.name) for track in recorded_targets(model, scenario.folder).tracks)
     return RecordingMetadata(start, is_utc, names)

@@ -23,7 +23,8 @@ from vedette.recorded.extents import places_of
 from vedette.recorded.turns import bearings_of
 from vedette.scenarios import Scenario
 from vedette.scenarios.build import build_scan_times, build_true_sensors, scan_loss_probabilities
-from vedette.scenarios.sections.recording import RecordingSection, recorded_sensors
+from vedette.scenarios.recorded_data import recorded_scans, recorded_sensors
+from vedette.scenarios.sections.recording import RecordingSection
 from vedette.scenarios.trust import custom_code
 from vedette.simulation.loop import scan_flags_of_run
 from vedette.simulation.records import RunRecord
@@ -93,7 +94,7 @@ def rows_of_record(record: RunRecord, scenario: Scenario) -> Rows:
 
 def _recording_of(record: RunRecord, section: RecordingSection, scenario: Scenario) -> RecordedScans:
     """Return the recording of a run. Raises `InputError` for one of other scans."""
-    recording = section.build(scenario.model, scenario.folder)
+    recording = recorded_scans(scenario.model, scenario.folder)
     if not np.array_equal(recording.times[: record.num_scans], record.times):
         raise InputError(f"{section.path}: expected the scans of the run; got others")
     return recording
@@ -142,7 +143,7 @@ def scan_table(record: RunRecord, scenario: Scenario) -> dict[str, list[Any]]:
     own_heights = ["own_height_m"] if any(site.kind in HEIGHT_DEPENDENT for site in sites) else []
     recording = None
     if scenario.model.recording is not None:
-        recording = scenario.model.recording.build(scenario.model, scenario.folder)
+        recording = recorded_scans(scenario.model, scenario.folder)
     accuracy = () if recording is None else dict.fromkeys(name for own in recording.accuracy_columns for name in own)
     header = ["time", "sensor", *quantities, *pose_columns, *own_heights, *map(_accuracy_column, accuracy)]
     table: dict[str, list[Any]] = {name: [] for name in header}

@@ -16,8 +16,8 @@ from vedette.models.arguments import reject
 from vedette.recorded.extents import box_of
 from vedette.scenarios.build import build_experiment, build_planner
 from vedette.scenarios.from_recording import LiveScenario
+from vedette.scenarios.recorded_data import recorded_sensors, returns_models
 from vedette.scenarios.sections.planners import NamedPlanner
-from vedette.scenarios.sections.recording import recorded_sensors, returns_models
 from vedette.tracking import OutOfSequenceTracker, SensorScan
 
 

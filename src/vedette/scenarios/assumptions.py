@@ -17,7 +17,7 @@ from vedette.recorded import RecordedScans
 from vedette.scenarios.assumed_clutter import assumed_clutter, place_stds
 from vedette.scenarios.region import describe_region, measured_region
 from vedette.scenarios.sections import ScenarioModel
-from vedette.scenarios.sections.undetected import has_intensity
+from vedette.scenarios.sections.undetected_intensity import has_intensity
 from vedette.scenarios.sensors_file import EXPECTED_BIRTHS, HEIGHT_STD, measured_birth, measures_heights
 
 _LOST_PER_SECOND = 0.001

@@ -31,8 +31,8 @@ from vedette.recorded.scan_times import Bearings, sensor_bias
 from vedette.scenarios.build import build_sensors
 from vedette.scenarios.dumping import dump_data
 from vedette.scenarios.loading import Scenario
+from vedette.scenarios.recorded_data import recorded_scans, recorded_sensors
 from vedette.scenarios.sections.base import GaussianMethod
-from vedette.scenarios.sections.recording import recorded_sensors
 from vedette.scenarios.sections.sensing import Clutter
 from vedette.scenarios.sections.sensors import Sensor
 from vedette.scenarios.sensors_file import EXPECTED_BIRTHS
@@ -82,7 +82,7 @@ def build_problem(
     sites = tuple(recorded_sensors(model))
     recording = RecordedScans(np.empty(0), 0.0, False, (), np.empty((0, len(sites), 3)), (), (bearings,) * len(sites))
     if model.recording is not None:
-        recording = model.recording.build(model, folder, as_told=True)
+        recording = recorded_scans(model, folder, as_told=True)
     parameters, only_positions = list[Parameter](), all(is_position(site.kind) for site in sites)
     for s, sensor in enumerate(model.sensors):
         if not recording.scans or any(scans[s] is not None for scans in recording.scans):

@@ -11,6 +11,7 @@ from ruamel.yaml import YAML
 from ruamel.yaml.comments import CommentedMap, CommentedSeq
 from ruamel.yaml.scalarstring import DoubleQuotedScalarString
 
+from vedette.scenarios.recorded_data import recorded_scans, recorded_targets
 from vedette.scenarios.sections import ScenarioModel, Section
 from vedette.scenarios.sections.base import sections_in
 from vedette.scenarios.sections.custom import Custom
@@ -43,9 +44,9 @@ def dump_stored(scenario: Scenario) -> str:
     model, folder = scenario.model, scenario.folder
     data = _with_absolute_paths(model.model_dump(mode="json"), folder.resolve())
     if model.recording is not None:
-        data["recording"]["sha256"] = model.recording.build(model, folder).file.sha256
+        data["recording"]["sha256"] = recorded_scans(model, folder).file.sha256
     if isinstance(model.targets, RecordedTargets):
-        data["targets"]["sha256"] = model.targets.source(model, folder).reports.sha256
+        data["targets"]["sha256"] = recorded_targets(model, folder).reports.sha256
     return dump_data(data)
 
 

@@ -17,6 +17,7 @@ import numpy as np
 from vedette.errors import InputError
 from vedette.internal.text import elided, printable
 from vedette.scenarios.diagnostics import Finding, Path, describe, shown_key
+from vedette.scenarios.recorded_data import recorded_targets
 from vedette.scenarios.sections import ScenarioModel
 from vedette.scenarios.sections.base import is_complete, readable_findings
 from vedette.scenarios.sections.custom import Custom, custom_objects
@@ -56,7 +57,7 @@ def _content_findings(recorded: RecordedTargets, model: ScenarioModel, folder: F
     findings = list[Finding]()
     if all(map(is_complete, (recorded, model.region, model.time))):
         try:
-            recorded.source(model, folder).truth(model.time.build(), rng=np.random.default_rng(0))
+            recorded_targets(model, folder).truth(model.time.build(), rng=np.random.default_rng(0))
             return
         except InputError as error:
             findings = [(("targets", "path"), "a file of recorded targets that a run can use", str(error))]

@@ -13,6 +13,7 @@ from vedette.errors import InputError
 from vedette.recorded import Conventions, RecordedScans
 from vedette.scenarios.assumptions import assumed_birth, assumed_motion, assumed_sections
 from vedette.scenarios.loading import Scenario
+from vedette.scenarios.recorded_data import recorded_scans
 from vedette.scenarios.region import describe_region, reached_region
 from vedette.scenarios.sensors_file import MAX_STEPS, placeholder_sections, read_sensors_file, validated_model
 
@@ -78,8 +79,7 @@ def scenario_from_recording(
     provisional = {**placeholder_sections(given, speed), **given}
     provisional["targets"] = {"kind": "unknown"}
     model = validated_model(document, provisional, sensors)
-    assert model.recording is not None
-    recording = model.recording.build(model, sensors.parent)
+    recording = recorded_scans(model, sensors.parent)
     descriptions = dict[str, str]()
     assumed = assumed_sections(given, model, recording, sensors.parent, speed, descriptions)
     section = given["targets"]

@@ -16,10 +16,10 @@ from vedette.scenarios.coastline import coastline_findings
 from vedette.scenarios.diagnostics import Diagnostic, Fault, Path, describe
 from vedette.scenarios.file_checks import BUILTIN_FOLDER, recorded_findings, reference_findings
 from vedette.scenarios.geojson import with_zones
+from vedette.scenarios.recorded_data import recording_findings
 from vedette.scenarios.sections import ScenarioModel
 from vedette.scenarios.sections.base import readable_findings
 from vedette.scenarios.sections.courses import path_in_file
-from vedette.scenarios.sections.recording import recording_findings
 from vedette.scenarios.validation import UNKNOWN_KEY, read_section, suggestion
 from vedette.scenarios.yaml_reader import MAX_BYTES, Document, read_yaml
 

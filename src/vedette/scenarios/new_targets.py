@@ -15,11 +15,12 @@ from vedette.internal.text import pluralise
 from vedette.kernels.base.types import Floats
 from vedette.scenarios.diagnostics import Path
 from vedette.scenarios.loading import Scenario
+from vedette.scenarios.recorded_data import recorded_scans
 from vedette.scenarios.sections import ScenarioModel
 from vedette.scenarios.sections.birth_labels import birth_probabilities
 from vedette.scenarios.sections.fusion import FULL_INFORMATION_FUSIONS, SINGLE_BELIEF_FUSIONS
 from vedette.scenarios.sections.tracking import UNLABELLED, Filter
-from vedette.scenarios.sections.undetected import has_intensity, undetected_anywhere
+from vedette.scenarios.sections.undetected_intensity import has_intensity, undetected_anywhere
 from vedette.scenarios.trust import custom_code
 
 if TYPE_CHECKING:  # importing the models is slow
@@ -138,7 +139,7 @@ def _placed(model: ScenarioModel, folder: FilePath) -> list[_Placed]:
     poses = [np.array(sensor.turning_pose, np.float64) for sensor in model.sensors]
     periods = [scan * sensor.scans.steps(scan)[0] for sensor in model.sensors]
     if model.recording is not None:
-        recording = model.recording.build(model, folder)
+        recording = recorded_scans(model, folder)
         poses = list(recording.poses[len(recording.times) // 2])
         numbers = np.array([[each is not None for each in scans] for scans in recording.scans]).sum(axis=0)
         periods = (len(recording.times) * scan / np.maximum(numbers, 1)).tolist()

@@ -14,6 +14,7 @@ from vedette.recorded.cleaning import longest_reachable
 from vedette.recorded.tables import column_names
 from vedette.scenarios.diagnostics import Path, format_path
 from vedette.scenarios.loading import Scenario
+from vedette.scenarios.recorded_data import recorded_scans, recorded_targets
 from vedette.scenarios.region import beyond_region_warnings
 from vedette.scenarios.sections import ScenarioModel
 from vedette.scenarios.sections.recording import noise_stds
@@ -29,7 +30,7 @@ def recording_warnings(scenario: Scenario) -> Iterator[tuple[Path, str]]:
     """Yield the places in the scenario and texts of warnings of recorded data that are probably mistakes."""
     model, folder = scenario.model, scenario.folder
     if model.recording is not None:
-        recording = model.recording.build(model, folder)
+        recording = recorded_scans(model, folder)
         yield from _unused_columns(("recording", "path"), model.recording.path, recording.unused)
         yield from ((("recording", "path"), note) for note in recording.notes)
         yield from beyond_region_warnings(model, recording)
@@ -37,7 +38,7 @@ def recording_warnings(scenario: Scenario) -> Iterator[tuple[Path, str]]:
         yield from _noise_beyond_ranges(model, recording)
     if not isinstance(model.targets, RecordedTargets):
         return
-    source = model.targets.source(model, folder)
+    source = recorded_targets(model, folder)
     yield from _repeated_reports(model.targets, source)
     yield from _single_reports(model.targets, source)
     if source.cleaning.max_speed is None:

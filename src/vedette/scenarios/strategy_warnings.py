@@ -8,6 +8,7 @@ from vedette.errors import InputError
 from vedette.internal.text import join_alternatives
 from vedette.scenarios.diagnostics import Path
 from vedette.scenarios.loading import Scenario
+from vedette.scenarios.sections.decision_checks import incompatibility
 from vedette.scenarios.sections.planners import STRATEGIES
 from vedette.scenarios.trust import custom_code, foreign_code_reason
 
@@ -20,7 +21,7 @@ def strategy_warnings(scenario: Scenario) -> Iterator[tuple[Path, str]]:
     refused: dict[str, list[str]] = {}
     makes = bool(custom_code(scenario.model)) and not foreign_code_reason(scenario)
     for name, strategy in STRATEGIES.items() if scenario.model.decision_steps else ():
-        if wanted := strategy.incompatibility(scenario.model) or (makes and _fault_of_planner(scenario, name)):
+        if wanted := incompatibility(scenario.model, strategy) or (makes and _fault_of_planner(scenario, name)):
             refused.setdefault(wanted, []).append(name)
     for wanted, names in refused.items():
         yield ("control",), f"a run with --planner {join_alternatives(names)} is refused: expected {wanted}"

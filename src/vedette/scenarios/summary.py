@@ -19,7 +19,8 @@ from vedette.scenarios.sections.platforms import GridMoves
 from vedette.scenarios.sections.sensors import Sensor
 from vedette.scenarios.sections.tracking import AnyFilter, Filter
 from vedette.scenarios.sections.true_sensors import BiasSection
-from vedette.scenarios.sections.undetected import UndetectedSection, searches_by_default
+from vedette.scenarios.sections.undetected import UndetectedSection
+from vedette.scenarios.sections.undetected_intensity import searches_by_default
 from vedette.scenarios.sections.world import RegionSection
 from vedette.scenarios.wording import describe_settings, name_in_words, plain_values, scans_in_words, short_value
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from vedette.errors import InputError
+from vedette.models import MotionModel
 from vedette.recorded import RecordedScans, Tracking
 from vedette.scenarios.build.sensors import (
     build_poses,
@@ -16,6 +17,9 @@ from vedette.scenarios.build.sensors import (
 )
 from vedette.scenarios.build.trackers import build_tracker
 from vedette.scenarios.loading import Scenario
+from vedette.scenarios.recorded_data import recorded_scans, recorded_targets
+from vedette.scenarios.sections.targets import RecordedTargets
+from vedette.scenarios.sections.world import grouped_order
 from vedette.simulation.experiment import Experiment
 from vedette.simulation.truth import TargetSource
 
@@ -37,7 +41,7 @@ def build_experiment(scenario: Scenario) -> Experiment:
     return Experiment(
         name=model.name,
         times=model.time.build(),
-        targets=model.targets.build(model, tracker.targets.motion, scenario.folder),
+        targets=build_targets(scenario, tracker.targets.motion),
         tracker=tracker,
         platforms=tuple(sensor.platform for sensor in sensors),
         poses=build_poses(scenario),
@@ -65,13 +69,19 @@ def build_tracking(scenario: Scenario, recording: RecordedScans | None = None) -
     model, folder = scenario.model, scenario.folder
     if model.recording is None:
         raise InputError(f"{model.name}: expected a section `recording`; got a scenario whose scans are simulated")
-    recording = recording or model.recording.build(model, folder)
+    recording = recording or recorded_scans(model, folder)
     tracker = build_tracker(scenario, tuple(sensor.filter for sensor in build_sensors(scenario)))
     truth = build_targets(scenario).truth(recording.times, rng=np.random.default_rng(0))  # draws nothing
     return Tracking(model.name, recording, tracker, model.estimates_by.build(folder), truth)
 
 
-def build_targets(scenario: Scenario) -> TargetSource:
-    """Return the true targets. Raises `InputError` for a custom motion or a recorded file that cannot be loaded."""
+def build_targets(scenario: Scenario, motion: MotionModel | None = None) -> TargetSource:
+    """Return the true targets, of this motion or the scenario's.
+
+    Raises `InputError` for a custom motion or a recorded file that cannot be loaded.
+    """
     model, folder = scenario.model, scenario.folder
-    return model.targets.build(model, model.motion.build(folder), folder)
+    motion = motion or model.motion.build(folder)
+    if isinstance(model.targets, RecordedTargets):
+        return recorded_targets(model, folder)
+    return model.targets.build(motion, grouped_order(model.motion), model.time.build(), model.region.build())

@@ -13,8 +13,9 @@ from vedette.scenarios.build.sensors import build_scan_times, build_sensors, fir
 from vedette.scenarios.build.trackers import has_lmb_beliefs, scene_for_program
 from vedette.scenarios.loading import Scenario
 from vedette.scenarios.sections.deciding import Lookahead
+from vedette.scenarios.sections.decision_checks import incompatibility
 from vedette.scenarios.sections.fusion import FULL_INFORMATION_FUSIONS, SINGLE_BELIEF_FUSIONS, CustomFusion
-from vedette.scenarios.sections.planners import STRATEGIES, NamedIndependent, NamedPlanner, get_strategy
+from vedette.scenarios.sections.planners import STRATEGIES, NamedIndependent, NamedPlanner
 from vedette.scenarios.sections.strategies import Parts, Strategy
 from vedette.simulation.oracle import Schedule
 from vedette.tracking import Network
@@ -42,8 +43,8 @@ def build_planner(scenario: Scenario, name: str, num_threads: int = 0) -> Planne
         known = ", ".join((*STRATEGIES, *model.planners))
         raise InputError(f"planner: expected one of {known}; got {name!r}")
     sensors = build_sensors(scenario)
-    strategy = get_strategy(model, name)
-    if reason := strategy.incompatibility(model, labels=has_labels(sensors[0].filter)):
+    strategy = model.strategy(name)
+    if reason := incompatibility(model, strategy, labels=has_labels(sensors[0].filter)):
         raise InputError(f"planner {name}: expected {reason}; got {name}")
     parts = build_parts(scenario, sensors, strategy, num_threads)
     if name in model.planners:

@@ -20,14 +20,13 @@ from vedette.platforms.patrolling import CLOCKS
 from vedette.platforms.velocity import WithVelocity
 from vedette.platforms.wrapper import PlatformWrapper
 from vedette.scenarios.loading import Scenario
-from vedette.scenarios.sections.control import revisit_constraint
 from vedette.scenarios.sections.custom import Custom, MissingMember
 from vedette.scenarios.sections.deciding import Lookahead
 from vedette.scenarios.sections.platforms import CustomPlatform
 from vedette.scenarios.sections.scenario import ScenarioModel
 from vedette.scenarios.sections.sensors import Sensor
 from vedette.scenarios.sections.tracking import CustomFilter
-from vedette.scenarios.sections.undetected import undetected_anywhere
+from vedette.scenarios.sections.undetected_intensity import undetected_anywhere
 from vedette.simulation.true_sensors import TrueSensor
 
 
@@ -68,7 +67,7 @@ def _platform(model: ScenarioModel, sensor: Sensor, folder: Path) -> Platform:
     if isinstance(section, CustomPlatform) and sensor.switchable and SWITCH in platform.columns:
         wanted = f"{section.function} to have no column {SWITCH}, as the sensor is switchable"
         raise MissingMember(section, "function", wanted, ", ".join(platform.columns))
-    visits = revisit_constraint(model)
+    visits = model.control.revisit()
     if visits is not None and section.top_speed > 0.0:
         platform = Patrolling(platform, visits.places, visits.radius)
     if price is None and sensor.budget is None and not sensor.switchable:
@@ -133,7 +132,7 @@ def build_scan_times(scenario: Scenario) -> Bools:
 
 def build_poses(scenario: Scenario) -> Floats:
     """Return the poses at the start, (num_sensors, pose_dim), padded with zeros to the longest."""
-    sensors, visits = scenario.model.sensors, revisit_constraint(scenario.model)
+    sensors, visits = scenario.model.sensors, scenario.model.control.revisit()
     poses = [sensor.pose if scenario.model.recording else sensor.turning_pose for sensor in sensors]
     longest = max(map(len, poses)) if visits is None else CLOCKS
     padded = np.array([(*pose, *(0.0,) * (longest - len(pose))) for pose in poses])

@@ -9,7 +9,6 @@ from vedette.densities import LabelledDensity
 from vedette.filters import Filter, common_target_model
 from vedette.fusion import Clmb, CmDeltaGlmb, Fusion, LabelMatchedFusion
 from vedette.scenarios.loading import Scenario
-from vedette.scenarios.sections.control import revisit_constraint
 from vedette.scenarios.sections.courses import sensor_as_courses
 from vedette.scenarios.sections.fusion import SCAN_FUSIONS
 from vedette.scenarios.sections.tracking import Filter as FilterSection
@@ -34,7 +33,7 @@ def build_tracker(scenario: Scenario, filters: tuple[Filter, ...]) -> Tracker:
         tracker = DelayedScanTracker(tracker, delays)
     if section is not None and tracker.initial().undetected is None:
         tracker = UndetectedTargetTracker(tracker, section.build(scenario.model.region))
-    revisit = revisit_constraint(scenario.model, of_targets=True)
+    revisit = scenario.model.control.revisit(of_targets=True)
     return tracker if revisit is None else ViewTracker(tracker, revisit.radius)
 
 

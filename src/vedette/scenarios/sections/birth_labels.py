@@ -13,12 +13,12 @@ from vedette.scenarios.sections.fusion import SINGLE_BELIEF_FUSIONS
 
 if TYPE_CHECKING:
     from vedette.kernels.base.types import Floats
-    from vedette.scenarios.sections.scenario import ScenarioModel
+    from vedette.scenarios.sections.fields import ScenarioFields
 
 CAPPED = ("delta_glmb", "m_delta_glmb")
 
 
-def max_label_sets(model: ScenarioModel) -> int | None:
+def max_label_sets(model: ScenarioFields) -> int | None:
     """Return the cap on label sets of a filter that enumerates them, if births have a period; None without a cap."""
     birth, section = model.birth, model.filter
     if section.kind == "custom" or section.kind not in CAPPED:
@@ -28,13 +28,13 @@ def max_label_sets(model: ScenarioModel) -> int | None:
     return int(section.limits.max_hypotheses)
 
 
-def birth_probabilities(model: ScenarioModel) -> Floats:
+def birth_probabilities(model: ScenarioFields) -> Floats:
     """Return the probability of a birth at each site within a step, shape (num_sites,)."""
     steps = model.time.step_period / (model.birth.period or model.time.step_period)
     return -np.expm1(steps * np.log1p([-site.existence for site in model.birth.sites]))
 
 
-def birth_steps(model: ScenarioModel) -> int:
+def birth_steps(model: ScenarioFields) -> int:
     """Return the largest number of steps with births from one scan of a belief to its next."""
     num, steps = model.time.num_steps, model.birth.steps
     births = np.ones(num) if steps == "every" else np.isin(np.arange(1, num + 1), steps)
@@ -47,19 +47,19 @@ def birth_steps(model: ScenarioModel) -> int:
     return longest
 
 
-def has_one_belief(model: ScenarioModel) -> bool:
+def has_one_belief(model: ScenarioFields) -> bool:
     """Return True if all scans update one belief."""
     return model.fusion.kind in SINGLE_BELIEF_FUSIONS
 
 
-def labels_until_detection(model: ScenarioModel, chances: Floats) -> Floats:
+def labels_until_detection(model: ScenarioFields, chances: Floats) -> Floats:
     """Return the mean number of unconfirmed labels of each site if a scan detects its targets with these chances."""
     most = model.time.num_steps if model.birth.steps == "every" else len(model.birth.steps)
     steps = birth_steps(model) / np.maximum(chances, 1e-9)
     return np.minimum(steps, most)
 
 
-def births_cut(model: ScenarioModel) -> Iterator[Finding]:
+def births_cut(model: ScenarioFields) -> Iterator[Finding]:
     """Yield a fault if a filter cuts its own births between scans, regardless of detections."""
     most = max_label_sets(model)
     if most is None:

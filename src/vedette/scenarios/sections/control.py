@@ -1,4 +1,4 @@
-"""Section about control: decision times and the value of actions; and its consistency with tracking."""
+"""Section about control: decision times and the value of actions."""
 
 from __future__ import annotations
 
@@ -10,25 +10,13 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 from pydantic import Field
 
-from vedette.internal.quantities import is_doppler
-from vedette.scenarios.diagnostics import Finding, Path, describe
-from vedette.scenarios.sections.base import (
-    Count,
-    Numbers,
-    Positive,
-    Share,
-    Step,
-    Steps,
-    check,
-)
+from vedette.scenarios.diagnostics import Finding, describe
+from vedette.scenarios.sections.base import Count, Numbers, Positive, Share, Step, Steps, check
 from vedette.scenarios.sections.deciding import AnyConstraint, AnyReward, AnySearch, Lookahead, Revisit
 from vedette.scenarios.sections.derived import Derived, derived, of_kind
-from vedette.scenarios.sections.tracking import UNLABELLED
 
 if TYPE_CHECKING:  # importing these imports the compiler, which a check does not need
     from vedette.control import Constraint, PlanningSettings
-    from vedette.scenarios.sections.deciding import AnyReward, AnySearch, Lookahead
-    from vedette.scenarios.sections.scenario import ScenarioModel
 
 
 _SETTINGS = "vedette.control.settings:PlanningSettings"
@@ -158,77 +146,7 @@ class Control(Derived):
         """Return the constraints on the sensors; raises `InputError` for one that cannot be built."""
         return tuple(constraint.build(folder) for constraint in self.constraints)
 
-
-def constraints_on_labels(model: ScenarioModel) -> Iterator[Finding]:
-    """Yield faults of constraints on predicted targets if the filter has no labels."""
-    for i, constraint in enumerate(model.control.constraints):
-        on_labels = constraint.kind == "void_probability" or (isinstance(constraint, Revisit) and not constraint.places)
-        if model.filter.kind in UNLABELLED and on_labels:
-            wanted = f"another constraint, as {model.filter.kind} filters have no labels to look ahead by"
-            yield ("control", "constraints", i, "kind"), wanted, describe(constraint.kind)
-
-
-def enough_switchable(model: ScenarioModel) -> Iterator[Finding]:
-    """Yield faults if fewer sensors may scan than cannot be switched off; skipped with custom platforms."""
-    fixed = sum(not sensor.switchable for sensor in model.sensors)
-    if any(sensor.platform.kind == "custom" for sensor in model.sensors):
-        return
-    for i, constraint in enumerate(model.control.constraints):
-        if constraint.kind != "max_active":
-            continue
-        if fixed == len(model.sensors):
-            yield ("control", "constraints", i, "kind"), "a sensor that is switchable, for max_active", "none"
-        elif constraint.sensors < fixed:
-            wanted = f"at least {fixed}, as so many sensors are not switchable"
-            yield ("control", "constraints", i, "sensors"), wanted, describe(constraint.sensors)
-
-
-def longer_plans(model: ScenarioModel) -> Iterator[Finding]:
-    """Yield faults of decisions over several periods that are not whole pseudo-updates, or not sums over labels."""
-    control = model.control
-    given: dict[Path, Lookahead | None] = {("control", "lookahead"): control.lookahead}
-    given.update({("planners", name): own for name, own in model.planners.items() if own.kind == "lookahead"})
-    for path, own in given.items():
-        if own is None:
-            continue
-        if own.period is not None:
-            horizon_period = model.horizon[1]
-            steps = own.period / horizon_period
-            if round(steps) < 1 or abs(steps - round(steps)) > 1e-9 * steps:
-                multiple = f"a whole multiple of control.horizon_period, {horizon_period:g}"
-                yield (*path, "period"), multiple, describe(own.period)
-    if control.lookahead is not None and control.association != "known" and control.reward.kind != "expected_loss":
-        yield ("control", "association"), "known, with a lookahead", describe(control.association)
-
-
-def targets_of_rules(model: ScenarioModel) -> Iterator[Finding]:
-    """Yield faults of rules without one target for each sensor."""
-    for name, own in model.planners.items():
-        if own.kind == "assigned_target" and own.targets is not None and len(own.targets) != len(model.sensors):
-            wanted = f"{len(model.sensors)} numbers, one a sensor"
-            yield ("planners", name, "targets"), wanted, describe(list(own.targets))
-
-
-def revisit_constraint(model: ScenarioModel, *, of_targets: bool = False) -> Revisit | None:
-    """Return the constraint on places, or targets, to be visited repeatedly; None if there is none."""
-    revisits = [own for own in model.control.constraints if isinstance(own, Revisit)]
-    return next((own for own in revisits if of_targets != bool(own.places)), None)
-
-
-def one_patrol(model: ScenarioModel) -> Iterator[Finding]:
-    """Yield faults of visits: they need a moving sensor, one constraint, and poses with room for the time of each."""
-    constraints, visits = model.control.constraints, revisit_constraint(model)
-    if visits and not any(sensor.platform.top_speed > 0.0 for sensor in model.sensors):
-        yield ("control", "constraints", constraints.index(visits), "kind"), "a sensor that moves, for revisit", "none"
-    for s, sensor in enumerate(model.sensors):
-        if visits and len(sensor.platform.components()) > 2:
-            yield ("sensors", s, "platform"), "a pose of at most five components, beside revisit", "more"
-        if visits and is_doppler(sensor.measurement.kind):
-            wanted = "no range rate, beside revisit, as poses have the velocity of a sensor or the times of its visits"
-            yield ("sensors", s, "measurement", "kind"), wanted, describe(sensor.measurement.kind)
-    for i, own in enumerate(constraints):
-        if isinstance(own, Revisit) and own is not revisit_constraint(model, of_targets=not own.places):
-            yield ("control", "constraints", i, "kind"), "one constraint revisit with all places or targets", "another"
-
-
-DECISION_CHECKS = (constraints_on_labels, enough_switchable, longer_plans, one_patrol, targets_of_rules)
+    def revisit(self, *, of_targets: bool = False) -> Revisit | None:
+        """Return the constraint on places, or targets, to be visited repeatedly; None if there is none."""
+        revisits = [own for own in self.constraints if isinstance(own, Revisit)]
+        return next((own for own in revisits if of_targets != bool(own.places)), None)

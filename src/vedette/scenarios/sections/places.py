@@ -20,7 +20,6 @@ from vedette.scenarios.sections.world import RegionSection
 
 if TYPE_CHECKING:  # importing it imports further packages, which a check does not need
     from vedette.recorded import Origin
-    from vedette.scenarios.sections.scenario import ScenarioModel
 
 _PLACE = {"lon", "lat"}
 _BOX = ("lon_min", "lon_max", "lat_min", "lat_max")
@@ -114,9 +113,8 @@ def _region(box: Mapping[str, Any], origin: Origin) -> Any:
     return {"x_min": x_min, "x_max": x_max, "y_min": y_min, "y_max": y_max}
 
 
-def misplaced_findings(model: ScenarioModel) -> Iterator[Finding]:
+def misplaced_findings(scenario: Section, origin: OriginSection | None) -> Iterator[Finding]:
     """Yield faults of places in metres that must be degrees, near the origin's degrees, and of places too far away."""
-    origin = model.origin
     if origin is None:
         return
     from vedette.recorded.geography import PLANE_REACH
@@ -124,7 +122,7 @@ def misplaced_findings(model: ScenarioModel) -> Iterator[Finding]:
     is_origin_far = max(abs(origin.lon), abs(origin.lat)) > 2.0 * _NEAR_DEG
     wanted = "metres from the origin, or a place {lon: , lat: } in degrees"
     near = f"places within {PLANE_REACH / 1000.0:g} km of the origin"
-    for path, section in sections_in(model):
+    for path, section in sections_in(scenario):
         for inside, points in _points_of(section):
             far = [(x, y) for x, y in points if max(abs(x), abs(y)) > PLANE_REACH]
             if far:

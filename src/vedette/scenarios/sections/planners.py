@@ -21,13 +21,12 @@ from vedette.scenarios.sections.strategies import (
     Parts,
     Strategy,
     ValuedStrategy,
-    missing_truth,
     with_reported_violations,
 )
 
 if TYPE_CHECKING:  # importing the planners imports the compiler, which a check does not need
     from vedette.control import Plan, Planner
-    from vedette.scenarios.sections.scenario import ScenarioModel
+    from vedette.scenarios.sections.control import Control
     from vedette.simulation import Truth
 
 
@@ -36,10 +35,7 @@ class NamedJoint(ValuedStrategy):
 
     kind: Literal["joint"] = Field(default="joint", description="Kind of planner [-].")
     search: AnySearch | None = Field(default=None, description="In place of control.search; none: that one [-].")
-
-    def description(self, model: ScenarioModel) -> str:
-        """Return a description: joint, and by which reward."""
-        return self.by_reward("joint decisions", model)
+    words: ClassVar[str] = "joint decisions"
 
     def planner(self, parts: Parts, folder: Path) -> Planner:
         """Return the joint planner with the search."""
@@ -54,11 +50,7 @@ class NamedJointWithTruth(NamedJoint):
 
     kind: Literal["true_targets"] = Field(default="true_targets", description="Kind of planner [-].")  # type: ignore[assignment]
 
-    def incompatibility(self, model: ScenarioModel, *, labels: bool | None = None) -> str:
-        """Return the requirement not met, also if true targets are unknown or lack components of a custom motion."""
-        return super().incompatibility(model, labels=labels) or missing_truth(model)
-
-    def description(self, model: ScenarioModel) -> str:
+    def description(self, control: Control) -> str:
         """Return a description: joint, with the true targets."""
         return "joint decisions, true targets given"
 
@@ -78,10 +70,11 @@ class NamedIndependent(ValuedStrategy):
     others: Literal["stay", "absent"] | None = Field(
         default=None, description="In place of control.others; none: that one [-]."
     )
+    words: ClassVar[str] = "independent decisions"
 
-    def description(self, model: ScenarioModel) -> str:
+    def description(self, control: Control) -> str:
         """Return a description: independent, by which reward, and the assumption about other sensors."""
-        return f"{self.by_reward('independent decisions', model)}, other sensors {self.others or model.control.others}"
+        return f"{super().description(control)}, other sensors {self.others or control.others}"
 
     def planner(self, parts: Parts, folder: Path) -> Planner:
         """Return the planner; its plans report violated constraints, as it ignores those on pairs of sensors."""
@@ -124,7 +117,7 @@ class NamedRule(Strategy):
         if self.targets is not None and self.kind != "assigned_target":
             yield ("targets",), f"none, as the rule is {self.kind}", describe(list(self.targets))
 
-    def description(self, model: ScenarioModel) -> str:
+    def description(self, control: Control) -> str:
         """Return a description: the rule."""
         return f"rule of thumb: {_RULES[self.kind]}"
 
@@ -140,14 +133,7 @@ class NamedOracle(Strategy, Derived):
     """What is done by who knows where the targets are, as of oracle: the floor beside which strategies are put."""
 
     kind: Literal["oracle"] = Field(default="oracle", description="Kind of planner [-].")
-
-    def incompatibility(self, model: ScenarioModel, *, labels: bool | None = None) -> str:
-        """Return the requirement that is not met if true targets are unknown or lack components of a custom motion."""
-        return missing_truth(model)
-
-    def description(self, model: ScenarioModel) -> str:
-        """Return a description: with the true targets."""
-        return "best decisions for the true targets"
+    words: ClassVar[str] = "best decisions for the true targets"
 
     def planner(self, parts: Parts, folder: Path) -> Planner:
         """Return the planner; it receives the true targets later."""
@@ -166,7 +152,7 @@ class CustomPlanner(Strategy, Custom):
     spared: ClassVar[tuple[str, ...]] = ("name",)  # given by the scenario
     gives: ClassVar[str] = "vedette.control:Planner"
 
-    def description(self, model: ScenarioModel) -> str:
+    def description(self, control: Control) -> str:
         """Return a description: the class or function."""
         return f"custom planner {self.function}"
 
@@ -178,7 +164,7 @@ class CustomPlanner(Strategy, Custom):
 class ProgramStrategy(Strategy, ProgramSection):
     """A planner that is a program."""
 
-    def description(self, model: ScenarioModel) -> str:
+    def description(self, control: Control) -> str:
         """Return a description: the command."""
         return f"external program {self.code}"
 
@@ -191,9 +177,7 @@ class ProgramStrategy(Strategy, ProgramSection):
 
 
 class _Random(Strategy):
-    def description(self, model: ScenarioModel) -> str:
-        """Return a description: random."""
-        return "random actions"
+    words: ClassVar[str] = "random actions"
 
     def planner(self, parts: Parts, folder: Path) -> Planner:
         from vedette.control import RandomPlanner
@@ -202,9 +186,7 @@ class _Random(Strategy):
 
 
 class _Fixed(Strategy):
-    def description(self, model: ScenarioModel) -> str:
-        """Return a description: no decisions."""
-        return "first course kept"
+    words: ClassVar[str] = "first course kept"
 
     def planner(self, parts: Parts, folder: Path) -> Planner:
         from vedette.control import ConstantPlanner
@@ -226,17 +208,6 @@ STRATEGIES: dict[str, Strategy] = {
     "constant": _Fixed(),
     "stationary": Strategy(),
 }
-
-
-def get_strategy(model: ScenarioModel, name: str) -> Strategy:
-    """Return the strategy of a scenario by its name. Raises `KeyError` for an unknown one."""
-    return model.planners[name] if name in model.planners else STRATEGIES[name]
-
-
-def describe_strategy(model: ScenarioModel, name: str) -> str:
-    """Return the description of a strategy; empty for an unknown name, such as `recorded`."""
-    known = name in model.planners or name in STRATEGIES
-    return get_strategy(model, name).description(model) if known else ""
 
 
 @dataclass(frozen=True, slots=True)

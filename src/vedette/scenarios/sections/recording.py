@@ -3,27 +3,19 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator
-from dataclasses import replace
 from functools import lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
 from pydantic import Field
 
-from vedette.errors import InputError
 from vedette.internal.quantities import COMPONENTS, QUANTITIES, in_file
-from vedette.scenarios.diagnostics import Finding, describe
-from vedette.scenarios.sections.base import SHA256_FIELD, NonNegative, Section, Sha256, is_complete, readable_findings
-from vedette.scenarios.sections.field_of_view import max_range
+from vedette.scenarios.sections.base import SHA256_FIELD, NonNegative, Section, Sha256
 
 if TYPE_CHECKING:
     from vedette.recorded import Origin, RecordedScans, RecordedSensor
     from vedette.recorded.returns import ReturnsModel
-    from vedette.scenarios.sections.scenario import ScenarioModel
     from vedette.scenarios.sections.sensors import Sensor
-
-_ASSUMED_DETECTION = 0.9  # where a detection model has no constant probability
 
 
 class RecordingSection(Section):
@@ -83,8 +75,10 @@ class RecordingSection(Section):
         default="refuse", description="Whether a row that cannot be read is an error, or left out and told of [-]."
     )
 
-    def build(self, world: ScenarioModel, folder: Path, *, as_told: bool = False) -> RecordedScans:
-        """Return the scans, without the sensors' biases unless `as_told`; an unchanged file is read only once.
+    def build(
+        self, sites: tuple[RecordedSensor, ...], returns: tuple[ReturnsModel, ...], origin: Origin | None, folder: Path
+    ) -> RecordedScans:
+        """Return the scans of these sensors; an unchanged file is read only once.
 
         Raises `InputError` for a file that cannot be read, with row and column.
         """
@@ -93,14 +87,8 @@ class RecordingSection(Section):
             state = os.stat(file)
         except (OSError, ValueError):
             state = None
-        from vedette.models.bias import NO_BIAS
-
-        origin = None if world.origin is None else world.origin.build()
         changed = state and (state.st_mtime_ns, state.st_size)
-        sites = recorded_sensors(world)
-        if as_told:
-            sites = [replace(site, bias=NO_BIAS) for site in sites]
-        return _read(str(file), changed, self.model_dump_json(), tuple(sites), returns_models(world), origin)
+        return _read(str(file), changed, self.model_dump_json(), sites, returns, origin)
 
 
 @lru_cache(maxsize=4)
@@ -127,19 +115,6 @@ def _read(
     return merged(recording, sites, extents_of(recording, sites, returns))
 
 
-def returns_models(world: ScenarioModel) -> tuple[ReturnsModel, ...]:
-    """Return for each sensor its extent, or the assumed parameters that an extent is learnt from."""
-    from vedette.recorded.returns import ReturnsModel
-
-    found = list[ReturnsModel]()
-    learnt = world.recording is not None and world.recording.extents == "found"
-    for sensor in world.sensors:
-        extent = sensor.extent if sensor.extent is not None or learnt else 0.0
-        probability = float(getattr(sensor.detection, "probability", _ASSUMED_DETECTION))
-        found.append(ReturnsModel(extent, noise_stds(sensor), probability))
-    return tuple(found)
-
-
 def noise_stds(sensor: Sensor) -> tuple[float, ...] | None:
     """Return the lowest standard deviation of each measured component, rad and m; None for custom noise."""
     noise = sensor.noise
@@ -147,48 +122,3 @@ def noise_stds(sensor: Sensor) -> tuple[float, ...] | None:
         names = COMPONENTS.get(sensor.measurement.kind, ())
         return tuple(QUANTITIES[name].in_si * getattr(noise, f"sigma_{in_file(name)}") for name in names)
     return tuple(noise.std) if noise.kind in ("constant", "by_axis") else None
-
-
-def recorded_sensors(world: ScenarioModel) -> list[RecordedSensor]:
-    """Return the sensors of a recording."""
-    from vedette.recorded import RecordedSensor
-
-    north = world.north()
-    shown_by_rows = "none" if world.recording is None else world.recording.turns
-    return [
-        RecordedSensor(
-            name,
-            sensor.measurement.kind,
-            sensor.pose,
-            sensor.bias.build(),
-            sensor.compass,
-            max_range(sensor),
-            north,
-            shown_by_rows if sensor.turn is None else sensor.turn.build(),
-            None if sensor.signal is None else sensor.signal.build(),
-            None if sensor.classification is None else sensor.classification.build(world.classes),
-        )
-        for name, sensor in zip(world.sensor_names, world.sensors, strict=True)
-    ]
-
-
-def recording_findings(world: ScenarioModel, folder: Path) -> Iterator[Finding]:
-    """Yield faults of recorded scans, and of sections that do not suit them."""
-    section = world.recording
-    if section is None:
-        return
-    yield from readable_findings(_content(section, world, folder))
-    if world.targets.kind not in ("recorded", "unknown"):
-        yield ("targets", "kind"), "recorded or unknown, as the scans are recorded", describe(world.targets.kind)
-    if world.decision_steps:
-        wanted = "no decisions, as it is recorded where the sensors went"
-        yield ("control",), wanted, f"{len(world.decision_steps)} of them"
-
-
-def _content(section: RecordingSection, world: ScenarioModel, folder: Path) -> Iterator[Finding]:
-    if not is_complete(section):
-        return
-    try:
-        section.build(world, folder)
-    except InputError as error:
-        yield ("recording",), "scans that can be read", str(error)

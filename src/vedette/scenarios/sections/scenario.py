@@ -1,243 +1,262 @@
-"""The whole scenario."""
+"""The whole scenario, with the checks across its sections, which no single section can make.
+
+Each is written as for a valid scenario. In a faulty one, a check ends at the first value that could not be read.
+"""
 
 from __future__ import annotations
 
-import math
-from collections import Counter
-from collections.abc import Iterator, Mapping
-from itertools import pairwise
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from collections.abc import Iterator, Sequence
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from pydantic import Field, field_validator
 
-from vedette.internal.quantities import HEIGHT_DEPENDENT
-from vedette.scenarios.diagnostics import Finding, describe
-from vedette.scenarios.sections.base import Chance, Name, Section, check, readable_findings
-from vedette.scenarios.sections.birth import Birth
-from vedette.scenarios.sections.checks import CHECKS, step_of_time
-from vedette.scenarios.sections.control import Control
-from vedette.scenarios.sections.courses import courses_to_headings
-from vedette.scenarios.sections.derived import of_kind
-from vedette.scenarios.sections.fusion import AnyFusion, Fusion
-from vedette.scenarios.sections.network import NetworkSection
-from vedette.scenarios.sections.places import OriginSection, in_metres, misplaced_findings
-from vedette.scenarios.sections.planners import STRATEGIES, AnyPlanner
-from vedette.scenarios.sections.recording import RecordingSection
-from vedette.scenarios.sections.scoring import (
-    AnyEstimator,
-    AnyMetric,
-    LeastGospaEstimator,
-    LeastOspaEstimator,
-    MapEstimator,
-    Ospa,
-)
-from vedette.scenarios.sections.sensors import CLUTTER, Sensor, SensorDefaults
-from vedette.scenarios.sections.targets import Targets
-from vedette.scenarios.sections.tracking import AnyFilter, Filter
-from vedette.scenarios.sections.undetected import UndetectedSection
-from vedette.scenarios.sections.world import (
-    Motion,
-    RegionSection,
-    Survival,
-    Time,
-)
+from vedette.internal.covariances import covariance_fault
+from vedette.internal.quantities import COMPONENTS, HEIGHT_DEPENDENT
+from vedette.kernels.base.types import HEIGHT
+from vedette.scenarios.diagnostics import Finding, Path, describe
+from vedette.scenarios.sections.base import check, readable_findings
+from vedette.scenarios.sections.birth import BirthSite
+from vedette.scenarios.sections.birth_labels import births_cut
+from vedette.scenarios.sections.decision_checks import DECISION_CHECKS, incompatibility
+from vedette.scenarios.sections.fields import ScenarioFields
+from vedette.scenarios.sections.fusion import LMB_FUSIONS, SCAN_FUSIONS
+from vedette.scenarios.sections.network_checks import NETWORK_CHECKS
+from vedette.scenarios.sections.places import misplaced_findings
+from vedette.scenarios.sections.targets import RECORDED_DIM
+from vedette.scenarios.sections.tracking import LABELLING, UNLABELLED
+from vedette.scenarios.sections.undetected_intensity import cells_of_undetected, learnt_births
+from vedette.scenarios.sections.world import TIME_TOLERANCE
 
-if TYPE_CHECKING:  # importing it imports the models, which a check does not need
-    from vedette.kernels.base.types import Floats
-    from vedette.platforms.compass import Compass
-
-# Largest number of steps of a horizon that ends at the next decision.
-_MAX_STEPS = 100
+if TYPE_CHECKING:
+    from vedette.scenarios.sections.sensors import Sensor
 
 
-def merge_sensor_defaults(data: Mapping[str, Any]) -> dict[str, Any]:
-    """Return a copy of a scenario's data in which `sensor_defaults` fills in keys that a sensor does not give."""
-    merged = dict(data)
-    defaults, sensors = data.get("sensor_defaults"), data.get("sensors")
-    if isinstance(defaults, Mapping) and isinstance(sensors, list | tuple):
-        given = {key: value for key, value in defaults.items() if value is not None}
-        merged["sensors"] = [{**given, **item} if isinstance(item, Mapping) else item for item in sensors]
-    return merged
-
-
-def with_reward(data: Mapping[str, Any]) -> Mapping[str, Any]:
-    """Return a scenario's data in which decisions without a reward use the error of the score."""
-    control, score = data.get("control"), data.get("ospa")
-    if not isinstance(control, Mapping) or "reward" in control or not isinstance(score, Mapping):
-        return data
-    given = {name: score[name] for name in ("cutoff", "order") if name in score}
-    if score.get("components", "position") != "position" or not all(map(_is_positive, given.values())):
-        return data
-    return {**data, "control": {**control, "reward": {"kind": "expected_loss", **given}}}
-
-
-def _is_positive(value: object) -> bool:
-    return isinstance(value, int | float) and not isinstance(value, bool) and 0.0 < value < math.inf
-
-
-class ScenarioModel(Section):
+class ScenarioModel(ScenarioFields):
     """A scenario: a world, the sensors in it, and how they track and decide."""
 
-    format: Literal[1] = Field(default=1, description="Version of this format [-].")
-    name: Name = Field(description="Short name [-].")
-    description: str = Field(default="", description="What it is, where it comes from [-].")
-    time: Time = Field(description="The scans [-].")
-    origin: OriginSection | None = Field(
-        default=None, description="Where x = y = 0 is on the Earth; none: nowhere, and all places are in metres [-]."
-    )
-    coastline: str | None = Field(
-        default=None,
-        description="GeoJSON file of lines or polygons in longitude and latitude, which pictures show and nothing "
-        "obeys, relative to the scenario file; none: there is none [-].",
-    )
-    region: RegionSection = Field(description="Surveillance region [-].")
-    motion: Motion = Field(default=of_kind("constant_velocity"), description="How targets move [-].")
-    survival: Survival = Field(default=of_kind("constant"), description="Whether they go on living [-].")
-    birth: Birth = Field(description="Where they appear, as the filters know it [-].")
-    classes: dict[Name, Chance] = Field(
-        default={},
-        description="Probability of each class of target, for sensors with `classification`; none: targets have no "
-        "classes [-].",
-    )
-    targets: Targets = Field(description="The true targets [-].")
-    recording: RecordingSection | None = Field(
-        default=None, description="Scans that were recorded; none: they are simulated [-]."
-    )
-    sensor_defaults: SensorDefaults | None = Field(
-        default=None, exclude=True, description="What the sensors share; merged into them when read [-]."
-    )
-    sensors: Annotated[tuple[Sensor, ...], Field(strict=False, min_length=1)] = Field(description="The sensors [-].")
-    filter: AnyFilter = Field(default=Filter(), description="The local filters [-].")
-    fusion: AnyFusion = Field(default=Fusion(), description="How their densities become one [-].")
-    network: NetworkSection | None = Field(
-        default=None, description="The radio between the sensors; none: all that one knows, all know at once [-]."
-    )
-    undetected: UndetectedSection | None = Field(
-        default=None, description="The targets not yet found, for planners that search; none: no account of them [-]."
-    )
-    estimator: AnyEstimator | None = Field(
-        default=None,
-        description="How estimates are read off; none: with a filter of kind factored_glmb, or lmb with births: "
-        "poisson, least_gospa if control.reward is expected_gospa, else least_ospa; with other filters map [-].",
-    )
-    control: Control = Field(default=Control(), description="When and how the sensors decide [-].")
-    planners: dict[Name, AnyPlanner] = Field(
-        default={},
-        description="Further strategies by name, beside jdm, idm, lookahead, nearest, assigned_target, centroid, "
-        "oracle, true_targets, random, constant and stationary [-].",
-    )
-    ospa: Ospa = Field(default=Ospa(), description="How the estimates are scored [-].")
-    metrics: dict[Name, AnyMetric] = Field(
-        default={}, description="Measures beside the built-in ones by name, each a column of the scans [-]."
-    )
+    @check
+    def _decision_steps(self) -> Iterator[Finding]:
+        for i, step in enumerate(self.control.decision_steps or ()):
+            yield from _up_to_last(("control", "decision_steps", i), step, self.time.num_steps)
 
     @check
-    def _names_of_strategies(self) -> Iterator[Finding]:
-        for name in self.planners:
-            if name in STRATEGIES:
-                yield ("planners", name), f"another name than {', '.join(STRATEGIES)}", describe(name)
-            elif name.startswith("-"):
-                yield ("planners", name), "a name that does not begin as an option does", describe(name)
-
-    @property
-    def class_probs(self) -> Floats | None:
-        """Probability of each class of target, (num_classes,); None if targets have no classes."""
-        return np.array(list(self.classes.values())) if self.classes else None
-
-    @check
-    def _classes_of_targets(self) -> Iterator[Finding]:
-        if CLUTTER in self.classes:
-            yield ("classes", CLUTTER), f"another name than {CLUTTER}, which is of false measurements", CLUTTER
-        if self.classes and (len(self.classes) < 2 or abs(sum(self.classes.values()) - 1.0) > 1e-6):
-            total = f"{len(self.classes)} of sum {sum(self.classes.values()):g}"
-            yield ("classes",), "at least 2 probabilities that sum to 1", total
-        for i, sensor in enumerate(self.sensors):
-            if sensor.classification is not None:
-                for path, wanted, got in sensor.classification.faults(self.classes):
-                    yield ("sensors", i, "classification", *path), wanted, got
-
-    @check
-    def _names_of_measures(self) -> Iterator[Finding]:
-        for name in self.metrics:
-            if not name.isidentifier():
-                yield ("metrics", name), "a name of letters, digits and underscores", describe(name)
-
-    @classmethod
-    def in_metres(cls, data: Mapping[str, Any]) -> Mapping[str, Any]:
-        """Return the mapping with places in degrees converted to metres, by its origin, and courses to headings."""
-        return courses_to_headings(in_metres(data))
-
-    @classmethod
-    def prepared(cls, data: Mapping[str, Any]) -> Mapping[str, Any]:
-        """Return the mapping in metres, with `sensor_defaults` filled in, and a reward if none is given."""
-        return with_reward(merge_sensor_defaults(cls.in_metres(data)))
-
-    @field_validator("sensor_defaults")
-    @classmethod
-    def _merged(cls, _: SensorDefaults | None) -> None:
-        return None
-
-    @check
-    def _across_sections(self) -> Iterator[Finding]:
-        for across in (*CHECKS, misplaced_findings):
-            yield from readable_findings(across(self))
-
-    @property
-    def sensor_names(self) -> tuple[str, ...]:
-        """Name of each sensor; `sensor 1`, `sensor 2`, ... for those without."""
-        return tuple(sensor.name or f"sensor {number}" for number, sensor in enumerate(self.sensors, 1))
-
-    @property
-    def by_compass(self) -> bool:
-        """True if directions are given and returned as courses, clockwise from true north, as on a chart."""
-        recorded = self.recording is not None and self.recording.bearings == "north"
-        return self.origin is not None or recorded or any(sensor.compass for sensor in self.sensors)
-
-    def north(self) -> Compass:
-        """Return the direction of true north: with an origin by the place on the Earth, else along y."""
-        from vedette.platforms.compass import PlaneCompass
-
-        return PlaneCompass() if self.origin is None else self.origin.build()
-
-    @property
-    def estimates_by(self) -> Any:
-        """The estimator section in use, given or default, with the cutoff and order of the score unless given."""
-        estimator: Any = self.estimator
-        if estimator is None:
-            by_gospa = self.control.reward.kind == "expected_gospa"
-            best = LeastGospaEstimator() if by_gospa else LeastOspaEstimator()
-            estimator = best if self.filter.built_kind == "factored_glmb" else MapEstimator()
-        missing = [name for name in ("cutoff", "order") if getattr(estimator, name, 0.0) is None]
-        if not missing:
-            return estimator  # the section itself, by which faults find their place
-        return estimator.model_copy(update={name: getattr(self.ospa, name) for name in missing})
-
-    @property
-    def has_heights(self) -> bool:
-        """True if states are [px, py, vx, vy, pz, vz]."""
-        depends = any(sensor.measurement.kind in HEIGHT_DEPENDENT for sensor in self.sensors)
-        return depends or self.motion.kind == "constant_velocity_height"
-
-    @property
-    def decision_steps(self) -> tuple[int, ...]:
-        """The scans after which the sensors decide, from any form of schedule."""
-        every = self.control.decision_every
-        if every is not None:
-            return tuple(range(every, self.time.num_steps, every))
-        if self.control.decision_times is None:
-            return self.control.decision_steps or ()
+    def _decision_times(self) -> Iterator[Finding]:
         time = self.time
-        steps = (step_of_time(moment, time.start, time.step_period) for moment in self.control.decision_times)
-        return tuple(step for step in steps if step is not None)
+        end = time.start + (time.num_steps - 1) * time.step_period
+        for i, moment in enumerate(self.control.decision_times or ()):
+            if not time.start <= moment <= end + TIME_TOLERANCE:
+                yield ("control", "decision_times", i), f"a time from {time.start:g} to {end:g} s", describe(moment)
+            elif time.step_at(moment) is None:
+                wanted = f"the time of a scan: {time.start:g} s and every {time.step_period:g} s after it"
+                yield ("control", "decision_times", i), wanted, describe(moment)
 
-    @property
-    def horizon(self) -> tuple[int, float]:
-        """H and T, s, of decisions; the default is scan by scan over the usual time to the next decision."""
-        control, scan = self.control, self.time.step_period
-        period = control.horizon_period or scan
-        if control.horizon_steps is not None:
-            return control.horizon_steps, period
-        gaps = Counter(after - before for before, after in pairwise((*self.decision_steps, self.time.num_steps)))
-        gap = max(gaps, key=lambda scans: (gaps[scans], scans), default=1)
-        return round(min(max(gap * scan / period, 1.0), _MAX_STEPS)), period
+    @check
+    def _weights(self) -> Iterator[Finding]:
+        weights = None if self.fusion.kind == "custom" else self.fusion.weights
+        if weights is not None and len(weights) != len(self.sensors):
+            yield ("fusion", "weights"), f"as many weights as sensors, {len(self.sensors)}", describe(weights)
+
+    @check
+    def _fusion_of_labels(self) -> Iterator[Finding]:
+        kind, num_sensors = self.filter.kind, len(self.sensors)
+        if kind not in UNLABELLED:
+            return
+        if num_sensors > 1:
+            wanted = f"a filter with labels by which to fuse, as there are {num_sensors} sensors"
+            yield ("filter", "kind"), wanted, describe(kind)
+        elif self.fusion.kind != "none":
+            wanted = f"none, as {kind} filters have no labels by which to fuse"
+            yield ("fusion", "kind"), wanted, describe(self.fusion.kind)
+
+    @check
+    def _fusion_of_several(self) -> Iterator[Finding]:
+        if self.filter.kind not in UNLABELLED and self.fusion.kind == "none" and len(self.sensors) > 1:
+            yield ("fusion", "kind"), f"a fusion, as there are {len(self.sensors)} sensors", '"none"'
+
+    @check
+    def _fusion_of_kind(self) -> Iterator[Finding]:
+        kind, filters = self.fusion.kind, self.filter.built_kind
+        if kind == "cm_delta_glmb" and filters == "lmb":
+            wanted = "sequential, parallel, clmb, arithmetic_average, central or none, as the filters are lmb"
+            yield ("fusion", "kind"), wanted, describe(kind)
+        if filters in ("lmb", "factored_glmb", "custom", *UNLABELLED):
+            return
+        if kind == "parallel":
+            wanted = f"sequential or another, as parallel is of lmb or factored_glmb filters, and these are {filters}"
+            yield ("fusion", "kind"), wanted, describe(kind)
+        if kind in LMB_FUSIONS and self.fusion.feedback:
+            yield ("fusion", "feedback"), f"false, as {filters} filters cannot go on from an LMB", "true"
+
+    @check
+    def _one_belief(self) -> Iterator[Finding]:
+        if self.fusion.kind in SCAN_FUSIONS and self.fusion.feedback:
+            yield ("fusion", "feedback"), "false, as nothing is fused while tracking", "true"
+
+    @check
+    def _central(self) -> Iterator[Finding]:
+        if self.filter.kind == "custom":
+            if self.fusion.kind in SCAN_FUSIONS:
+                wanted = "a fusion of densities, as each sensor has a filter of your own"
+                yield ("fusion", "kind"), wanted, describe(self.fusion.kind)
+        elif self.fusion.kind == "central" and self.filter.assignment.kind != "ranked":
+            wanted = "ranked, as one filter takes the scans of all sensors"
+            yield ("filter", "assignment", "kind"), wanted, describe(self.filter.assignment.kind)
+
+    @check
+    def _estimator(self) -> Iterator[Finding]:
+        kind = self.estimates_by.kind
+        if self.filter.kind in UNLABELLED and kind in ("least_ospa", "least_gospa", "marginal"):
+            yield ("estimator", "kind"), f"map, as {self.filter.kind} filters have no labels", f'"{kind}"'
+
+    @check
+    def _combinations(self) -> Iterator[Finding]:
+        if self.fusion.kind == "custom" or self.fusion.mixture_power in ("auto", "moment_matched"):
+            return
+        limits, num_sensors = self.fusion.limits, len(self.sensors)
+        if limits.max_components**num_sensors > limits.max_combinations:
+            power = f"a number whose power by {num_sensors} sensors"
+            wanted = f"{power} is at most max_combinations, {limits.max_combinations}"
+            yield ("fusion", "limits", "max_components"), wanted, describe(limits.max_components)
+
+    @check
+    def _heights(self) -> Iterator[Finding]:
+        """Yield faults if measurements depend on a height but states of the filters or the true targets have none."""
+        others = ", ".join(each for each in COMPONENTS if each not in HEIGHT_DEPENDENT)
+        wanted = f"one of {others}, or motion: constant_velocity_height (as targets have no height)"
+        for i, kind in enumerate([sensor.measurement.kind for sensor in self.sensors]):
+            if kind in HEIGHT_DEPENDENT and self.motion.kind not in ("constant_velocity_height", "custom"):
+                yield ("sensors", i, "measurement", "kind"), wanted, describe(kind)
+
+    @check
+    def _birth_steps(self) -> Iterator[Finding]:
+        for i, step in enumerate(() if self.birth.steps == "every" else self.birth.steps):
+            yield from _up_to_last(("birth", "steps", i), step, self.time.num_steps)
+
+    @check
+    def _birth_sites(self) -> Iterator[Finding]:
+        for i, site in enumerate(self.birth.sites):
+            path: Path = ("birth", "sites", i)
+            yield from readable_findings(_state_length((*path, "mean"), site, "mean", self))
+            yield from readable_findings(_state_length((*path, "std"), site, "std", self))
+            yield from readable_findings(_covariance((*path, "cov"), site, self))
+
+    _births_cut = check(births_cut)
+
+    @check
+    def _targets(self) -> Iterator[Finding]:
+        if self.targets.kind == "poisson":
+            for name in ("mean", "std"):
+                yield from readable_findings(_state_length(("targets", name), self.targets, name, self))
+        if self.targets.kind == "uniform" and len(self.targets.std) != (rest := self.motion.state_dim - 2):
+            wanted = f"{rest} numbers, as a state under motion has but the position"
+            yield ("targets", "std"), wanted, describe(self.targets.std)
+        if self.targets.kind != "scripted":
+            return
+        for i, target in enumerate(self.targets.tracks):
+            path: Path = ("targets", "tracks", i)
+            for name in ("state", "std"):
+                yield from readable_findings(_state_length((*path, name), target, name, self))
+            for name in ("start_step", "end_step"):
+                yield from readable_findings(_last_step((*path, name), target, name, self))
+
+    @check
+    def _unknown_targets(self) -> Iterator[Finding]:
+        if self.targets.kind == "unknown" and self.recording is None:
+            yield ("targets", "kind"), "targets to simulate scans of, or a recording of scans", '"unknown"'
+
+    @check
+    def _sensor_names(self) -> Iterator[Finding]:
+        names: set[str] = set()
+        for i, sensor in enumerate(self.sensors):
+            yield from readable_findings(_name_once(("sensors", i, "name"), sensor, names))
+
+    @check
+    def _scan_steps(self) -> Iterator[Finding]:
+        for i, sensor in enumerate(self.sensors):
+            yield from readable_findings(_first_scan(("sensors", i, "scans"), sensor, self))
+
+    @check
+    def _scans_of_unlabelled(self) -> Iterator[Finding]:
+        kind = self.filter.kind
+        for i, sensor in enumerate(self.sensors if kind in UNLABELLED else ()):
+            if sensor.scans.late is not None:
+                wanted = f"none, as {kind} filters cannot predict without a scan ({LABELLING} can)"
+                yield ("sensors", i, "scans", "late"), wanted, "late scans"
+            if sensor.scans.scan_loss_probability or not sensor.scans.build(self.time).all():
+                yield ("sensors", i, "scans"), f"every step, as {kind} filters go on from each scan", "only some"
+            if sensor.switchable:
+                yield ("sensors", i, "switchable"), f"false, as {kind} filters go on from each scan", "true"
+
+    @check
+    def _planners_fit(self) -> Iterator[Finding]:
+        for name, planner in self.planners.items():
+            if fault := incompatibility(self, planner):
+                yield ("planners", name, "kind"), fault, describe(planner.kind)
+
+    @check
+    def _score(self) -> Iterator[Finding]:
+        for name in ("first_scan", "last_scan"):
+            yield from readable_findings(_last_step(("ospa", name), self.ospa, name, self))
+        components, motion = self.ospa.components, self.motion
+        if components == "state" and self.targets.kind == "recorded" and motion.state_dim != RECORDED_DIM:
+            wanted = f"position, as states have {motion.state_dim} components and recorded targets {RECORDED_DIM}"
+            yield ("ospa", "components"), wanted, '"state"'
+        if components == "position_and_height" and motion.state_dim <= HEIGHT + 1:
+            yield ("ospa", "components"), "position, as targets have no height", '"position_and_height"'
+
+    @check
+    def _checks_of_other_files(self) -> Iterator[Finding]:
+        for findings in (cells_of_undetected, learnt_births, *NETWORK_CHECKS, *DECISION_CHECKS):
+            yield from readable_findings(findings(self))
+
+    @check
+    def _places(self) -> Iterator[Finding]:
+        yield from misplaced_findings(self, self.origin)
+
+
+def _up_to_last(path: Path, step: int | None, last: int) -> Iterator[Finding]:
+    if step is not None and step > last:
+        yield path, f"a step up to the last, {last}", describe(step)
+
+
+def _state_length(path: Path, holder: Any, field: str, model: ScenarioFields) -> Iterator[Finding]:
+    values, dim = getattr(holder, field), model.motion.state_dim
+    if values is not None and len(values) != dim:
+        yield path, f"{dim} numbers, as a state under motion has", describe(values)
+
+
+def _covariance(path: Path, site: BirthSite, model: ScenarioFields) -> Iterator[Finding]:
+    if site.cov is None:
+        return
+    rows: Sequence[Sequence[float]] = site.cov
+    dim = model.motion.state_dim
+    if len(rows) != dim or any(len(row) != dim for row in rows):
+        shape = f"rows of {', '.join(str(len(row)) for row in rows)}" if len(rows) == dim else describe(rows)
+        yield path, f"{dim} rows of {dim} numbers", shape
+    elif fault := covariance_fault(np.array(rows)):
+        yield path, *fault
+
+
+def _last_step(path: Path, holder: Any, name: str, model: ScenarioFields) -> Iterator[Finding]:
+    yield from _up_to_last(path, getattr(holder, name), model.time.num_steps)
+
+
+def _name_once(path: Path, sensor: Sensor, names: set[str]) -> Iterator[Finding]:
+    if sensor.name in names:
+        yield path, "each name once", f"{describe(sensor.name)} again"
+    elif sensor.name is not None:
+        names.add(sensor.name)
+
+
+def _first_scan(path: Path, sensor: Sensor, model: ScenarioFields) -> Iterator[Finding]:
+    scans, period = sensor.scans, model.time.step_period
+    for inside, wanted, got in scans.findings_beside(period):
+        yield (*path, *inside), wanted, got
+    interval = scans.steps(period)[0] * period
+    # Sensors files have no targets to simulate, and their scans have separate times.
+    simulates = model.recording is None and (model.targets.kind != "scripted" or model.targets.tracks)
+    if sensor.turn is not None and simulates and sensor.turn.period > interval * (1.0 + 1e-9):
+        wanted = f"at most the time from one scan to the next, {interval:g} s"
+        yield (*path[:-1], "turn", "period"), wanted, describe(sensor.turn.period)
+    name = "first" if scans.period is None else "offset"
+    yield from _up_to_last((*path, name), scans.steps(period)[1], model.time.num_steps)

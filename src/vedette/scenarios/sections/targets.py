@@ -13,7 +13,6 @@ import numpy as np
 from pydantic import Field
 
 from vedette.errors import InputError
-from vedette.internal.quantities import HEIGHT_DEPENDENT
 from vedette.scenarios.diagnostics import Finding, describe
 from vedette.scenarios.sections.base import (
     SHA256_FIELD,
@@ -27,12 +26,12 @@ from vedette.scenarios.sections.base import (
     check,
 )
 from vedette.scenarios.sections.derived import Derived, derived
-from vedette.scenarios.sections.world import RegionSection, grouped_order
+from vedette.scenarios.sections.world import RegionSection
 
 if TYPE_CHECKING:  # importing the models imports the compiler, which a check does not need
-    from vedette.models import MotionModel
+    from vedette.kernels.base.types import Floats
+    from vedette.models import MotionModel, Region
     from vedette.recorded import RecordedTargets as RecordedSource
-    from vedette.scenarios.sections.scenario import ScenarioModel
     from vedette.simulation import PoissonTargets as PoissonSource
     from vedette.simulation import ScriptedTargets as ScriptedSource
     from vedette.simulation import UniformTargets as UniformSource
@@ -84,12 +83,12 @@ class ScriptedTargets(Section):
             changes[min((track.end_step or num_steps) + 1, num_steps + 1)] -= 1
         return float(np.cumsum(changes)[: num_steps + 1].max())
 
-    def build(self, world: ScenarioModel, motion: MotionModel, folder: Path) -> ScriptedSource:
-        """Return the targets, moved by `motion`."""
+    def build(self, motion: MotionModel, order: list[int], times: Floats, region: Region) -> ScriptedSource:
+        """Return the targets, moved by `motion`, whose states have the section's components in this order."""
         from vedette.simulation import ScriptedTargets
 
-        times, tracks = world.time.build(), self.tracks
-        order, shape = grouped_order(world.motion), (len(tracks), motion.state_dim)
+        tracks = self.tracks
+        shape = (len(tracks), motion.state_dim)
         states = np.array([track.state for track in tracks]).reshape(shape)
         stds = np.array([track.std or (0.0,) * motion.state_dim for track in tracks]).reshape(shape)
         return ScriptedTargets(
@@ -154,27 +153,18 @@ class RecordedTargets(Derived):
         """Return None: the number is known only from the file."""
         return None
 
-    def build(self, world: ScenarioModel, motion: MotionModel, folder: Path) -> RecordedSource:
-        """Return the recorded targets. Raises `InputError` for a file that cannot be read or has no targets."""
-        return self.source(world, folder)
+    def source(self, region: RegionSection, origin: Point | None, has_height: bool, folder: Path) -> RecordedSource:
+        """Return the recorded targets. Raises `InputError` for a file that cannot be read or has no targets.
 
-    def source(self, world: ScenarioModel, folder: Path) -> RecordedSource:
-        """Return the recorded targets, with heights if the states of the scenario and the file have them.
-
-        An unchanged file is read only once.
+        An unchanged file is read only once. origin: of the scenario, longitude and latitude, deg. has_height: whether
+        states have heights, which the targets then have if the file has them.
         """
         file = folder / self.path
         try:
             state = os.stat(file)
         except (OSError, ValueError):
             raise InputError(f"{self.path}: expected a readable file of recorded targets; got none") from None
-        origin = None if world.origin is None else (world.origin.lon, world.origin.lat)
-        has_height = world.motion.kind == "constant_velocity_height"
-        found = _read(str(file.resolve()), state.st_mtime_ns, state.st_size, self, world.region, origin, has_height)
-        if not found.with_height and needs_true_heights(world):
-            wanted = "a column altitude_m of every report, as true heights are measured or compared"
-            raise InputError(f"{self.path}: expected {wanted}; got none")
-        return found
+        return _read(str(file.resolve()), state.st_mtime_ns, state.st_size, self, region, origin, has_height)
 
 
 @lru_cache(maxsize=16)
@@ -203,12 +193,6 @@ def _read(
     return replace(found, with_height=True) if has_height and found.reports.altitudes is not None else found
 
 
-def needs_true_heights(world: ScenarioModel) -> bool:
-    """Return True if sensors are simulated that measure heights, or the errors of heights count."""
-    measured = world.recording is None and any(each.measurement.kind in HEIGHT_DEPENDENT for each in world.sensors)
-    return measured or world.ospa.components == "position_and_height"
-
-
 class PoissonTargets(Section):
     """Targets drawn anew in every run, the same for all strategies: they move under the motion model, with its noise.
 
@@ -233,13 +217,11 @@ class PoissonTargets(Section):
             return None
         return self.expected * (1.0 - (1.0 - self.death_probability) ** num_steps) / self.death_probability
 
-    def build(self, world: ScenarioModel, motion: MotionModel, folder: Path) -> PoissonSource:
-        """Return the targets, moved by `motion`."""
+    def build(self, motion: MotionModel, order: list[int], times: Floats, region: Region) -> PoissonSource:
+        """Return the targets, moved by `motion`, whose states have the section's components in this order."""
         from vedette.simulation import PoissonTargets
 
-        order = grouped_order(world.motion)
         mean, std = np.array(self.mean)[order], np.array(self.std)[order]
-        region = world.region.build()
         return PoissonTargets(motion, self.expected, mean, np.diag(std**2), self.death_probability, region)
 
 
@@ -268,12 +250,12 @@ class UniformTargets(Section):
         """Return the mean number at every scan."""
         return float(self.number)
 
-    def build(self, world: ScenarioModel, motion: MotionModel, folder: Path) -> UniformSource:
+    def build(self, motion: MotionModel, order: list[int], times: Floats, region: Region) -> UniformSource:
         """Return the targets, moved by `motion`."""
         from vedette.simulation import UniformTargets
 
         # In either order of a file, the components except the position have the order of the library.
-        return UniformTargets(motion, self.number, world.region.build(), np.array(self.std), self.death_probability)
+        return UniformTargets(motion, self.number, region, np.array(self.std), self.death_probability)
 
 
 class UnknownTargets(Section):
@@ -285,7 +267,7 @@ class UnknownTargets(Section):
         """Return None."""
         return None
 
-    def build(self, world: ScenarioModel, motion: MotionModel, folder: Path) -> ScriptedSource:
+    def build(self, motion: MotionModel, order: list[int], times: Floats, region: Region) -> ScriptedSource:
         """Return no targets."""
         from vedette.simulation import ScriptedTargets
 

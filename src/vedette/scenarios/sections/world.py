@@ -12,19 +12,17 @@ import numpy as np
 from pydantic import Field
 
 from vedette.scenarios.diagnostics import Finding, describe
-from vedette.scenarios.sections.base import (
-    GaussianMethod,
-    Positive,
-    Section,
-    Whole,
-    check,
-)
+from vedette.scenarios.sections.base import GaussianMethod, Positive, Section, Whole, check
 from vedette.scenarios.sections.custom import Custom, MissingMember
 from vedette.scenarios.sections.derived import Part, derived, one_of
 
 if TYPE_CHECKING:  # importing the models imports the compiler, which a check does not need
     from vedette.kernels.base.types import Floats
     from vedette.models import MotionModel
+
+
+# Largest distance of a time from a scan, in scans: rounding of sums of decimal fractions.
+TIME_TOLERANCE = 1e-6
 
 
 class Time(Section):
@@ -43,6 +41,11 @@ class Time(Section):
     def build(self) -> Floats:
         """Return the times of the scans in s, (num_steps,); that of step k is entry k - 1."""
         return self.start + self.step_period * np.arange(self.num_steps, dtype=np.float64)
+
+    def step_at(self, moment: float) -> int | None:
+        """Return the scan at a time, s; None if there is none."""
+        position = (moment - self.start) / self.step_period + 1.0
+        return round(position) if abs(position - round(position)) <= TIME_TOLERANCE else None
 
 
 @derived("vedette.models.region:Region")
