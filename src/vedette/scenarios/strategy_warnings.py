@@ -8,7 +8,7 @@ from vedette.errors import InputError
 from vedette.internal.text import join_alternatives
 from vedette.scenarios.diagnostics import Path
 from vedette.scenarios.loading import Scenario
-from vedette.scenarios.sections.decision_checks import incompatibility
+from vedette.scenarios.sections.consistency import incompatibility
 from vedette.scenarios.sections.planners import STRATEGIES
 from vedette.scenarios.trust import custom_code, foreign_code_reason
 

@@ -12,8 +12,8 @@ from vedette.fusion import Fusion, ParallelUpdate
 from vedette.scenarios.build.sensors import build_scan_times, build_sensors, first_actions
 from vedette.scenarios.build.trackers import has_lmb_beliefs, scene_for_program
 from vedette.scenarios.loading import Scenario
+from vedette.scenarios.sections.consistency import incompatibility
 from vedette.scenarios.sections.deciding import Lookahead
-from vedette.scenarios.sections.decision_checks import incompatibility
 from vedette.scenarios.sections.fusion import FULL_INFORMATION_FUSIONS, SINGLE_BELIEF_FUSIONS, CustomFusion
 from vedette.scenarios.sections.planners import STRATEGIES, NamedIndependent, NamedPlanner
 from vedette.scenarios.sections.strategies import Parts, Strategy

@@ -18,8 +18,7 @@ from vedette.scenarios.sections.birth import Birth
 from vedette.scenarios.sections.control import Control
 from vedette.scenarios.sections.courses import courses_to_headings
 from vedette.scenarios.sections.derived import of_kind
-from vedette.scenarios.sections.fusion import AnyFusion, Fusion
-from vedette.scenarios.sections.network import NetworkSection
+from vedette.scenarios.sections.fusion import AnyFusion, Fusion, NetworkSection
 from vedette.scenarios.sections.places import OriginSection, in_metres
 from vedette.scenarios.sections.planners import STRATEGIES, AnyPlanner
 from vedette.scenarios.sections.recording import RecordingSection

@@ -1,4 +1,4 @@
-"""Sections about fusion of the sensors' beliefs or scans."""
+"""Sections about fusion of the sensors' beliefs or scans, and the radio network over which they are sent."""
 
 from __future__ import annotations
 
@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING, Annotated, ClassVar, Literal, TypeAlias
 from pydantic import Field
 
 from vedette.scenarios.diagnostics import Finding, describe
-from vedette.scenarios.sections.base import Chance, Probability, Section, check
+from vedette.scenarios.sections.base import Chance, Probability, Section, Whole, check
 from vedette.scenarios.sections.custom import Custom
-from vedette.scenarios.sections.derived import Derived, derived
+from vedette.scenarios.sections.derived import Derived, Part, derived
 from vedette.scenarios.sections.program import ProgramCentral
 
 if TYPE_CHECKING:  # importing the fusions imports the compiler, which a check does not need
@@ -208,3 +208,16 @@ class CustomFusion(Custom):
 
 
 AnyFusion = Annotated[Fusion | CustomFusion, Field(discriminator="kind")]
+
+
+@derived("vedette.tracking.network:Network")
+class NetworkSection(Part):
+    """Who hears whom: messages are passed on from sensor to sensor, and each goes on from what it has heard."""
+
+    delay: Annotated[Whole, Field(ge=0, le=1000)]
+
+    @check
+    def _consensus_is_at_once(self) -> Iterator[Finding]:
+        for name in ("max_hops", "delay"):
+            if self.consensus_rounds is not None and getattr(self, name):
+                yield (name,), "none with consensus_rounds", describe(getattr(self, name))

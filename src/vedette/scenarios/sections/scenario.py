@@ -17,10 +17,9 @@ from vedette.scenarios.diagnostics import Finding, Path, describe
 from vedette.scenarios.sections.base import check, readable_findings
 from vedette.scenarios.sections.birth import BirthSite
 from vedette.scenarios.sections.birth_labels import births_cut
-from vedette.scenarios.sections.decision_checks import DECISION_CHECKS, incompatibility
+from vedette.scenarios.sections.consistency import CONSISTENCY_CHECKS, incompatibility
 from vedette.scenarios.sections.fields import ScenarioFields
 from vedette.scenarios.sections.fusion import LMB_FUSIONS, SCAN_FUSIONS
-from vedette.scenarios.sections.network_checks import NETWORK_CHECKS
 from vedette.scenarios.sections.places import misplaced_findings
 from vedette.scenarios.sections.targets import RECORDED_DIM
 from vedette.scenarios.sections.tracking import LABELLING, UNLABELLED
@@ -206,7 +205,7 @@ class ScenarioModel(ScenarioFields):
 
     @check
     def _checks_of_other_files(self) -> Iterator[Finding]:
-        for findings in (cells_of_undetected, learnt_births, *NETWORK_CHECKS, *DECISION_CHECKS):
+        for findings in (cells_of_undetected, learnt_births, *CONSISTENCY_CHECKS):
             yield from readable_findings(findings(self))
 
     @check
