@@ -66,7 +66,7 @@ class CustomCentral(Custom):
 
 
 class Fusion(Section):
-    """How what the sensors believe, or their scans, become one."""
+    """Fusion of the beliefs or scans of all sensors."""
 
     kind: FusionKind = Field(
         default="sequential",
@@ -212,7 +212,7 @@ AnyFusion = Annotated[Fusion | CustomFusion, Field(discriminator="kind")]
 
 @derived("vedette.tracking.network:Network")
 class NetworkSection(Part):
-    """Who hears whom: messages are passed on from sensor to sensor, and each goes on from what it has heard."""
+    """Links between sensors. Messages pass from sensor to sensor, and each continues from those it received."""
 
     delay: Annotated[Whole, Field(ge=0, le=1000)]
 
