@@ -11,7 +11,7 @@ from vedette.kernels.base.types import Bools, Floats
 from vedette.models.measurement import wrap_angles
 from vedette.platforms import Options
 from vedette.platforms.base import SWITCH
-from vedette.platforms.camera import HALF_WIDTH, POINTING, is_camera
+from vedette.platforms.camera import HALF_WIDTH, POINTING, angle_beyond_view, is_camera
 
 POINTS = "pointing_deg"  # the column of actions with the pointing of a camera
 _ARRIVED = 1e-9  # s
@@ -31,10 +31,7 @@ def seconds_to_turn(own: Options, rate: float, places: Floats) -> Floats:
     """
     if rate == 0.0:
         return np.zeros(len(places))
-    ends = own.courses[:, np.newaxis, -1]
-    offsets = places - ends[:, :, :2]
-    off = wrap_angles(np.arctan2(offsets[:, :, 1], offsets[:, :, 0]) - ends[:, :, POINTING])
-    return np.asarray(np.maximum(np.abs(off) - ends[:, :, HALF_WIDTH], 0.0).min(axis=0) / rate)
+    return np.asarray(angle_beyond_view(own.courses[:, np.newaxis, -1], places).min(axis=0) / rate)
 
 
 def seconds_to_search(

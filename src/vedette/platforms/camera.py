@@ -31,20 +31,24 @@ def line_of_sight(pose: Floats) -> float:
     return float(pose[POINTING] if is_camera(pose) else pose[2])
 
 
+def angle_beyond_view(poses: Floats, places: Floats) -> Floats:
+    """Return the angle, rad, from the field of view of cameras to places, 0 for other sensors. Shapes as `view_gap`."""
+    offsets = places - poses[..., :2]
+    if poses.shape[-1] <= HALF_WIDTH:
+        return np.zeros(offsets.shape[:-1])
+    off = np.abs(wrap_angles(np.arctan2(offsets[..., 1], offsets[..., 0]) - poses[..., POINTING]))
+    half_widths = np.where(poses[..., HALF_WIDTH] > 0.0, poses[..., HALF_WIDTH], math.pi)
+    return np.asarray(np.maximum(off - half_widths, 0.0))
+
+
 def view_gap(poses: Floats, places: Floats, radius: float) -> Floats:
     """Return the distance in m by which a place is out of a sensor's view. 0: in view.
 
     It is the distance beyond `radius`, m, plus, for a camera, the arc from the place to its field of view. poses: (...,
     pose_dim). places: (..., 2) m. Both are broadcast.
     """
-    offsets = places - poses[..., :2]
-    distances = np.hypot(offsets[..., 0], offsets[..., 1])
-    gaps = np.maximum(distances - radius, 0.0)
-    if poses.shape[-1] > HALF_WIDTH:
-        off = np.abs(wrap_angles(np.arctan2(offsets[..., 1], offsets[..., 0]) - poses[..., POINTING]))
-        half_widths = np.where(poses[..., HALF_WIDTH] > 0.0, poses[..., HALF_WIDTH], math.pi)
-        gaps = gaps + distances * np.maximum(off - half_widths, 0.0)
-    return np.asarray(gaps)
+    distances = np.hypot(*np.moveaxis(places - poses[..., :2], -1, 0))
+    return np.asarray(np.maximum(distances - radius, 0.0) + distances * angle_beyond_view(poses, places))
 
 
 @dataclass(frozen=True, slots=True)

@@ -15,7 +15,7 @@ from vedette.errors import InputError
 from vedette.kernels.base.types import Floats, Ints
 from vedette.models.arguments import float_array, positive, probability
 from vedette.models.measurement import wrap_angles
-from vedette.platforms.camera import POINTING, is_camera, view_gap
+from vedette.platforms.camera import POINTING, angle_beyond_view, is_camera, view_gap
 from vedette.platforms.patrolling import CLOCKS
 
 # Horizons of lead before a place is due: one in which a platform may still move away, and one for the way.
@@ -115,7 +115,7 @@ class Revisit(PerSensorConstraint):
             distances = np.hypot(*offsets.T)
             with np.errstate(divide="ignore", invalid="ignore"):
                 move = np.maximum(distances - self.radius, 0.0) / speeds
-                turn = view_gap(at, places[place], math.inf) / (distances * turn_rates)
+                turn = angle_beyond_view(at, places[place]) / turn_rates
             arrival = ready + np.fmax(np.fmax(move, turn), 0.0)
             if not np.isfinite(arrival).any():  # out of reach
                 continue

@@ -207,9 +207,10 @@ def ascend(
         at.chosen[sensor] = chosen
         add_scans(table, cells, sensor, first + chosen, 1.0, at)
         line += 1
-        known.lines[sensor], settled = line, settled + 1 if chosen == present else 1
-        for course in (first + present, first + chosen):
-            if chosen != present:
+        known.lines[sensor], settled = line, settled + 1
+        if chosen != present:
+            settled = 1
+            for course in (first + present, first + chosen):
                 known.changed[table.labels[table.offsets[course] : table.offsets[course + 1]]] = line
         evaluations[line] = evaluations[line - 1] + table.first_courses[sensor + 1] - first - 1
         best[line] = reward

@@ -26,7 +26,8 @@ POWER_INTEGRALS = 0
 EXPECTED_LOSS = 1
 FUNCTION = 2
 
-# A smaller probability of detection is what rounding leaves of scans that were added and subtracted again.
+# A smaller probability of detection is rounding: sums of log (1 - q), each of at most 28, keep 1e-14 of scans that were
+# subtracted again. Real ones are at least 1e-6, as labels seen less are out of reach.
 _LEAST_DETECTED = 1e-12
 
 
