@@ -63,6 +63,13 @@ def mask_for(example: Situation, *constraints: Any) -> Mask:
     return mask
 
 
+def test_a_sensor_does_not_take_its_own_place_among_those_that_may_scan() -> None:
+    one = active(3, 3, 1)
+    assert not one.is_full([0, -1, 5], 0)
+    assert one.is_full([0, -1, 5], 1)
+    assert not active(3, 3, 2).is_full([0, -1, 5], 1)
+
+
 @pytest.mark.parametrize("most", [1, 2])
 @pytest.mark.parametrize("reward", [CauchySchwarzReward("reference"), LOSS])
 def test_exhaustive_search_finds_the_best_of_what_is_allowed_and_bounds_hold(most: int, reward: Any) -> None:

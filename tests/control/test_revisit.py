@@ -66,6 +66,15 @@ def test_the_nearest_sensor_goes_when_it_is_time() -> None:
     assert [own.tolist() for own in constraint.courses(situation(90.0))] == [[True, False, False], [True] * 3]
 
 
+def test_courses_that_come_to_the_place_are_equally_good_however_far_they_go_in() -> None:
+    """From 50 m on, three courses come within 30, 10 and 0 m of a place with a radius of 30 m."""
+    poses, times = np.array([pose(50.0, 0.0, 90.0)]), np.arange(1.0, 6.0)
+    moves = np.zeros((4, 5, len(poses[0])))
+    moves[..., 0] = np.array([-4.0, -8.0, -10.0, -3.0])[:, np.newaxis] * times
+    found = Revisit([(0.0, 0.0)], 30.0, 60.0).violations(ConstraintContext((poses + moves,), times, poses=poses))
+    assert found[0].tolist() == [0.0, 0.0, 0.0, 5.0]
+
+
 def visited(fields: dict[str, Any] | None = None) -> Scenario:
     constraint = {"kind": "revisit", "places": [list(place) for place in PLACES], "radius": RADIUS, "every": EVERY}
     scene = load_scenario("paper-a")

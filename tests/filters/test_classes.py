@@ -17,7 +17,7 @@ from vedette import models
 from vedette.densities import GLMB, LMB, FactoredGLMB, Marks, Poisson, as_lmb, load_density, save_density
 from vedette.errors import InputError
 from vedette.filters import DeltaGlmbFilter, FactoredGlmbFilter, Limits, MultiSensorGlmbFilter, SequentialFactoredFilter
-from vedette.models import with_row_noise
+from vedette.models import ScanRows
 from vedette.tracking.births import births_from_scans
 
 pytestmark = pytest.mark.lanes
@@ -33,7 +33,7 @@ def ratios(num: int, seed: int = 5, num_classes: int = 3) -> Any:
 
 
 def with_features(scan: Any, log_ratios: Any) -> Any:
-    return with_row_noise(scan, np.zeros(np.shape(scan)), log_class_ratios=log_ratios)
+    return ScanRows(scan, np.zeros(np.shape(scan)), class_ratios=log_ratios)
 
 
 def classified(scene: Scene) -> models.TargetModel:
@@ -109,7 +109,7 @@ def test_features_alike_for_all_classes_are_one_ratio(kind: Any) -> None:
     belief = other = None
     for number in (1, 2):
         belief, _ = step(classes, with_features(scan, np.tile(log_ratios[:, None], 3)), belief, number=number)
-        other, _ = step(plain, with_row_noise(scan, np.zeros((3, 2)), log_ratios), other, number=number)
+        other, _ = step(plain, ScanRows(scan, np.zeros((3, 2)), log_ratios=log_ratios), other, number=number)
         np.testing.assert_allclose(np.exp(log_class_probs(belief)), np.tile(PROBS, (len(log_class_probs(belief)), 1)))
         for mine, theirs in zip(components(belief), components(other), strict=True):
             np.testing.assert_allclose(mine, theirs, rtol=1e-9, atol=1e-9)
@@ -125,7 +125,7 @@ def test_the_first_features_count_as_their_mean_over_the_classes(kind: Any) -> N
     scan, features = np.array([[10.5, 9.0], [14.0, 12.0]]), ratios(2)
     site, mean = birth(1), logsumexp(features + np.log(PROBS), axis=1)
     found = step(make(kind, birth=replace(site, class_probs=PROBS)), with_features(scan, features))[0]
-    expected = step(make(kind, birth=site), with_row_noise(scan, np.zeros((2, 2)), mean))[0]
+    expected = step(make(kind, birth=site), ScanRows(scan, np.zeros((2, 2)), log_ratios=mean))[0]
     np.testing.assert_allclose(existences(found), existences(expected), rtol=1e-10)
     for mine, theirs in zip(components(found), components(expected), strict=True):
         np.testing.assert_allclose(mine, theirs, rtol=1e-9, atol=1e-9)

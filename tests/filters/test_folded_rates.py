@@ -93,8 +93,8 @@ def test_a_range_rate_that_may_be_one_of_several_is_none(kind: Any, stds: Any, o
     folded, other = make(kind, birth=NOBODY, **doppler(LARGEST, stds)), make(kind, birth=NOBODY, **plain)
     rows, fewer = scan, scan[:, :2]
     if own_noise:
-        rows = models.with_row_noise(scan, np.tile(stds, (2, 1)))
-        fewer = models.with_row_noise(fewer, np.tile(stds[:2], (2, 1)))
+        rows = models.ScanRows(scan, np.tile(stds, (2, 1)))
+        fewer = models.ScanRows(fewer, np.tile(stds[:2], (2, 1)))
     found, expected = step(folded, rows, prior, dt=0.0)[0], step(other, fewer, prior, dt=0.0)[0]
     np.testing.assert_allclose(existences(found), existences(expected), rtol=1e-6)
     close(found, expected, 1e-5, 1e-5)

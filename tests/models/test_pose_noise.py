@@ -12,7 +12,6 @@ from vedette.errors import InputError
 from vedette.internal.quantities import COMPONENTS, HEIGHT_DEPENDENT
 from vedette.kernels.base.types import OWN_HEIGHT, OWN_VELOCITY, Floats
 from vedette.models.pose_noise import PoseStds, pose_noise, pose_stds_of
-from vedette.models.row_noise import noise_of_rows, row_noise
 
 PLACES = {"x": 0, "y": 1, "height": OWN_HEIGHT, "vx": OWN_VELOCITY, "vy": OWN_VELOCITY + 1}
 KINDS = ("bearing_range", "bearing_range_rate", "bearing_range_elevation", "bearing_range_altitude")
@@ -68,22 +67,20 @@ BASE = np.array([[0.01, 0.002], [0.002, 4.0]])
     ],
 )
 def test_it_is_added_to_the_noise_of_the_row_or_the_model(stds: tuple[float, float], expected: Any) -> None:
-    row = np.array([[1.0, 500.0, *row_noise(stds, (False, False), added=MORE)]])
-    np.testing.assert_allclose(noise_of_rows(row, BASE[np.newaxis]), [expected], rtol=1e-12)
-    same = models.with_row_noise([[1.0, 500.0]], [stds], added=[MORE])
-    np.testing.assert_allclose(same, row, rtol=1e-12)
+    row = models.ScanRows([[1.0, 500.0]], [stds], added_noise=[MORE])
+    np.testing.assert_allclose(row.covs(BASE[np.newaxis]), [expected], rtol=1e-12)
 
 
 def test_a_component_that_is_added_alone_leaves_the_others_to_the_model() -> None:
-    row = models.with_row_noise([[1.0, 500.0]], [[0.0, 0.0]], added=[np.diag([0.04, 0.0])])
-    np.testing.assert_allclose(noise_of_rows(row, BASE[np.newaxis]), [BASE + np.diag([0.04, 0.0])])
+    row = models.ScanRows([[1.0, 500.0]], [[0.0, 0.0]], added_noise=[np.diag([0.04, 0.0])])
+    np.testing.assert_allclose(row.covs(BASE[np.newaxis]), [BASE + np.diag([0.04, 0.0])])
 
 
 def test_covariances_below_0_are_refused() -> None:
-    with pytest.raises(InputError, match="added: expected symmetric positive definite"):
-        models.with_row_noise([[1.0, 500.0]], [[1.0, 1.0]], added=[-MORE])
-    with pytest.raises(InputError, match="covs: expected symmetric positive definite"):
-        models.with_row_noise([[1.0, 500.0]], [-MORE])
+    with pytest.raises(InputError, match="added_noise: expected symmetric positive definite"):
+        models.ScanRows([[1.0, 500.0]], [[1.0, 1.0]], added_noise=[-MORE])
+    with pytest.raises(InputError, match="noise: expected symmetric positive definite"):
+        models.ScanRows([[1.0, 500.0]], [-MORE])
 
 
 def test_an_altitude_above_the_slant_range_leaves_a_distance_on_the_ground() -> None:

@@ -48,6 +48,14 @@ def test_a_gap_too_long_for_chance_is_an_outage() -> None:
     assert read(later).empty[0].endswith("; not in 1 longer gap, taken for outages)")
 
 
+def test_a_sensor_that_sometimes_scans_twice_within_half_a_period_has_none() -> None:
+    """Its other scans alone are as regular as those of a sensor with a period."""
+    rows, _ = one_target(0, detection=0.95)
+    assert read(rows).empty
+    again = [(time + 0.05, x, y) for time, x, y in rows[40::60]]
+    assert not read(sorted([*rows, *again])).empty
+
+
 def test_rows_of_empty_cells_and_the_setting_leave_the_scans_as_they_are() -> None:
     rows, _ = one_target(0)
     assert 0 not in sizes(read(rows, empty_scans="none"))

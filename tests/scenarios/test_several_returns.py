@@ -12,7 +12,6 @@ import pytest
 from vedette.errors import ScenarioError
 from vedette.evaluation.fit import fit_of_run
 from vedette.evaluation.runs import run_scenario
-from vedette.models.row_noise import noise_of_rows
 from vedette.recorded import RecordedScans, RecordedSensor
 from vedette.recorded.merging import Spread, merged
 from vedette.recorded.returns import Extent, ReturnsModel, extents_of
@@ -179,5 +178,5 @@ def test_a_camera_is_read_with_a_radar_and_refused_alone(tmp_path: Path) -> None
 def test_returns_at_the_sensor_have_a_bearing_within_their_spread() -> None:
     spread = Spread(4, 800.0)
     scan = spread.added_to(np.array([[0.3, 0.0], [0.3, 100.0]]), "bearing_range")
-    stds = np.sqrt([own[0, 0] for own in noise_of_rows(scan, np.zeros((2, 2, 2)))])
+    stds = np.sqrt([own[0, 0] for own in scan.covs(np.zeros((2, 2, 2)))])
     np.testing.assert_allclose(stds, [1.0, spread.std / 100.0])

@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 from scipy.stats import expon
 
+from models.same_rows import assert_same_rows
 from vedette.errors import InputError
 from vedette.evaluation import track_recording
 from vedette.evaluation.scans import scan_table
@@ -20,11 +21,11 @@ from vedette.live.messages import read_message
 from vedette.models import (
     Bias,
     Region,
+    ScanRows,
     SignalModel,
     around_sensor,
     measurement_space_clutter,
     region_clutter,
-    with_row_noise,
 )
 from vedette.models.functions import numbers_at
 from vedette.models.pose_noise import PoseStds, pose_noise
@@ -55,7 +56,7 @@ def scans_of(columns: dict[str, Any], site: RecordedSensor = RADAR, conventions:
 def test_standard_deviations_of_rows_are_read_in_their_units() -> None:
     first, second = scans_of(ROWS)
     stds = [[math.radians(1.0), 50.0], [math.radians(2.0), 0.0]]
-    np.testing.assert_allclose(first, with_row_noise([[0.5, 1000.0], [1.0, 2000.0]], stds))
+    assert_same_rows(first, ScanRows([[0.5, 1000.0], [1.0, 2000.0]], stds))
     assert second.shape == (0, 2)
 
 
@@ -64,9 +65,9 @@ def test_positions_have_correlations_and_degrees_have_metres() -> None:
     covs = [[[9.0, -6.0], [-6.0, 16.0]], [[9.0, 0.0], [0.0, 16.0]]]
     place = replace(RADAR, kind="position")
     (scan,) = scans_of({"time": [0.0, 0.0], "x": [1.0, 2.0], "y": [5.0, 6.0], **accuracy}, place)
-    np.testing.assert_allclose(scan, with_row_noise([[1.0, 5.0], [2.0, 6.0]], covs))
+    assert_same_rows(scan, ScanRows([[1.0, 5.0], [2.0, 6.0]], covs))
     (scan,) = scans_of({"time": [0.0, 0.0], "lon": [0.0, 0.001], "lat": [0.0, 0.0], **accuracy}, place)
-    np.testing.assert_allclose(scan[:, 2:5], [[9.0, -6.0, 16.0], [9.0, 0.0, 16.0]])
+    np.testing.assert_allclose(scan.noise, covs)
 
 
 @pytest.mark.parametrize(
@@ -92,7 +93,7 @@ def test_a_ratio_without_a_signal_is_a_column_that_is_not_read() -> None:
     columns = ROWS | {"snr_db": [12.0, 20.0, None]}
     assert parse_scans(as_table(columns), [RADAR], EAST).unused == ("snr_db",)
     first, _ = scans_of(columns, replace(RADAR, signal=SIGNAL))
-    np.testing.assert_allclose(first[:, -1], [SIGNAL.log_likelihood_ratio(each) for each in (12.0, 20.0)])
+    np.testing.assert_allclose(first.log_ratios, [SIGNAL.log_likelihood_ratio(each) for each in (12.0, 20.0)])
 
 
 @pytest.mark.parametrize("snr", [10.0, 11.0, 12.5])
@@ -114,7 +115,7 @@ def test_a_likelihood_ratio_is_bounded() -> None:
 def test_a_bias_is_removed_and_the_accuracy_stays() -> None:
     first, _ = scans_of(ROWS, replace(RADAR, bias=Bias(range=100.0)))
     plain, _ = scans_of(ROWS)
-    np.testing.assert_allclose(first, plain - [0.0, 100.0, 0.0, 0.0, 0.0, 0.0])
+    assert_same_rows(first, ScanRows(plain.values - [0.0, 100.0], plain.noise))
 
 
 def test_rows_of_one_target_are_merged_with_their_mean_covariance() -> None:
@@ -123,21 +124,18 @@ def test_rows_of_one_target_are_merged_with_their_mean_covariance() -> None:
     (scan,) = merged(recording, [RADAR], [Extent(30.0, "as given")]).scans[0]
     assert scan is not None
     before: Any = recording.scans[0][0]
-    places = before[:, 1:2] * np.column_stack([np.cos(before[:, 0]), np.sin(before[:, 0])])
-    mean = before.mean(axis=0)
+    places = before.values[:, 1:2] * np.column_stack([np.cos(before.values[:, 0]), np.sin(before.values[:, 0])])
+    mean, noise = before.values.mean(axis=0), before.noise.mean(axis=0)
     variance = ((places - mean[1] * np.array([math.cos(mean[0]), math.sin(mean[0])])) ** 2).mean()
-    grown = mean + np.array([0.0, 0.0, variance / mean[1] ** 2, 0.0, variance, 0.0])
-    np.testing.assert_allclose(scan, grown[np.newaxis])
+    grown = noise + np.diag([variance / mean[1] ** 2, variance])
+    assert_same_rows(scan, ScanRows([mean], [grown]))
 
 
 def test_rows_may_lack_an_altitude() -> None:
     site = replace(RADAR, kind="bearing_range_altitude")
     columns = {"time": [0.0, 0.0], "bearing_rad": [0.5, 1.0], "range_m": [9e3, 8e3], "altitude_fl": [100.0, None]}
     (scan,) = scans_of(columns, site)
-    missing = with_row_noise([[1.0, 8e3, np.nan]], np.zeros((1, 3)))[0]
-    assert scan[0, 2] == pytest.approx(3048.0)
-    np.testing.assert_allclose(scan[1, 3:], missing[3:])
-    assert not scan[0, 3:].any()
+    assert_same_rows(scan, ScanRows([[0.5, 9e3, 3048.0], [1.0, 8e3, np.nan]]))
     with pytest.raises(InputError, match=r"row 2, column .range_m.: expected a finite number"):
         scans_of(columns | {"range_m": [9e3, None]}, site)
 
@@ -151,8 +149,8 @@ def test_lines_have_standard_deviations_and_ratios() -> None:
     given = line(stds=[[0.01, 50.0], [None, 20.0]], snr_db=[12.0, None])
     scan = read_message(given, "line 1", [site], Conventions({}, {})).scan.measurements
     ratios = [SIGNAL.log_likelihood_ratio(12.0), 0.0]
-    expected = with_row_noise([[0.5, 1000.0], [1.0, 2000.0]], [[0.01, 50.0], [0.0, 20.0]], ratios)
-    np.testing.assert_allclose(scan, expected)
+    expected = ScanRows([[0.5, 1000.0], [1.0, 2000.0]], [[0.01, 50.0], [0.0, 20.0]], log_ratios=ratios)
+    assert_same_rows(scan, expected)
 
 
 @pytest.mark.parametrize(
@@ -172,7 +170,7 @@ def test_bad_accuracy_in_lines_is_named(more: dict[str, Any], expected: str) -> 
 def test_a_line_may_lack_an_altitude_and_no_range() -> None:
     site = replace(RADAR, kind="bearing_range_altitude")
     scan = read_message(line(measurements=[[0.5, 9e3, None]]), "line 1", [site], Conventions({}, {})).scan
-    assert scan.measurements.shape == (1, 10)
+    assert_same_rows(scan.measurements, ScanRows([[0.5, 9e3, np.nan]]))
     with pytest.raises(InputError, match="numbers"):
         read_message(line(measurements=[[0.5, None, 100.0]]), "line 1", [site], Conventions({}, {}))
 
@@ -185,7 +183,8 @@ def test_a_sensors_file_reads_accuracy_and_signal(tmp_path: Path) -> None:
     rows = "".join(f"{k},{0.5 + 0.001 * k},1000,50,1.0,{11 + k % 3}\n" for k in range(12))
     (tmp_path / "scans.csv").write_text("time,bearing_rad,range_m,range_std_m,bearing_std_deg,snr_db\n" + rows)
     found = scenario_from_recording(tmp_path / "radar.yaml", tmp_path / "scans.csv", speed=10.0).recording
-    assert all(scan.shape == (1, 6) for (scan,) in found.scans if scan is not None)
+    scans = [scan for (scan,) in found.scans if scan is not None]
+    assert all(isinstance(scan, ScanRows) and len(scan.noise) == len(scan.log_ratios) == 1 for scan in scans)
 
 
 @pytest.mark.parametrize(
@@ -207,7 +206,7 @@ def test_a_sensors_file_reads_accuracy_and_signal(tmp_path: Path) -> None:
 )
 def test_clutter_of_rows_without_a_component_has_the_density_of_the_others(clutter: Any, without: Any) -> None:
     scan = np.array([[0.5, 20.0], [-0.3, 70.0], [0.9, 120.0]])
-    rows = with_row_noise(np.column_stack([scan, np.full(3, np.nan)]), np.zeros((3, 3)))
+    rows = np.column_stack([scan, np.full(3, np.nan)])
     found = numbers_at(clutter.log_intensity, rows, np.zeros(3), clutter.params)
     np.testing.assert_allclose(found, without.log_intensity_at(scan, np.zeros(3)), rtol=1e-12)
 
@@ -227,12 +226,13 @@ def test_errors_of_the_own_pose_add_to_the_noise() -> None:
     added = [
         pose_noise(row, ("bearing", "range"), (0.0, 0.0, 0.0), own) for row, own in zip(measured, poses, strict=True)
     ]
-    np.testing.assert_allclose(first, with_row_noise(measured, stds, added=added), rtol=1e-12)
+    assert_same_rows(first, ScanRows(measured, stds, added_noise=added), rtol=1e-12)
     # By hand, of the first row: along and across the line of sight.
     along = math.hypot(30.0 * math.cos(0.5), 40.0 * math.sin(0.5))
-    assert first[0, 4] == pytest.approx(50.0**2 + along**2)
+    covs = first.covs(np.zeros((2, 2, 2)))
+    assert covs[0, 1, 1] == pytest.approx(50.0**2 + along**2)
     across = math.hypot(30.0 * math.sin(0.5), 40.0 * math.cos(0.5)) / 1000.0
-    assert first[0, 2] == pytest.approx(math.radians(1.0) ** 2 + math.radians(1.5) ** 2 + across**2)
+    assert covs[0, 0, 0] == pytest.approx(math.radians(1.0) ** 2 + math.radians(1.5) ** 2 + across**2)
 
 
 def test_bad_accuracy_of_the_own_pose_is_named() -> None:
@@ -250,7 +250,7 @@ def test_lines_have_standard_deviations_of_the_pose() -> None:
     scan = read_message(given, "line 1", [RADAR], Conventions({}, {})).scan.measurements
     measured, own = [[0.5, 1000.0], [1.0, 2000.0]], PoseStds(x=30.0, heading=math.radians(1.5))
     added = [pose_noise(row, ("bearing", "range"), (0.0, 0.0, 0.0), own) for row in measured]
-    np.testing.assert_allclose(scan, with_row_noise(measured, np.zeros((2, 2)), added=added), rtol=1e-12)
+    assert_same_rows(scan, ScanRows(measured, added_noise=added), rtol=1e-12)
     empty = line(pose_stds={"x": 30.0}, measurements=[])
     assert len(read_message(empty, "line 1", [RADAR], Conventions({}, {})).scan.measurements) == 0
 

@@ -13,6 +13,7 @@ import pytest
 from scipy.stats import norm
 
 from live.examples import small
+from models.same_rows import assert_same_rows
 from vedette.densities import Estimate
 from vedette.errors import InputError, ScenarioError
 from vedette.evaluation import track_recording
@@ -21,7 +22,7 @@ from vedette.evaluation.joining import joins_of_run, with_joined_tracks
 from vedette.evaluation.scans import scan_table
 from vedette.evaluation.track_table import table_of_run, write_tracks
 from vedette.live.messages import read_message
-from vedette.models import BirthModel, ClassFeatures, with_row_noise
+from vedette.models import BirthModel, ClassFeatures, ScanRows
 from vedette.recorded import Conventions, RecordedSensor, parse_scans
 from vedette.recorded.merging import merged
 from vedette.recorded.returns import Extent
@@ -100,7 +101,7 @@ def test_classes_and_sizes_of_rows_are_read() -> None:
     ratios = [CAMERA.log_ratios(0, 20.0), CAMERA.log_ratios(1), CAMERA.log_ratios(size=100.0)]
     measured = [[1.0, 5.0], [200.0, 6.0], [300.0, 7.0]]
     scan: Any = recording.scans[0][0]
-    np.testing.assert_allclose(scan, with_row_noise(measured, np.zeros((3, 2)), None, None, ratios))
+    assert_same_rows(scan, ScanRows(measured, class_ratios=ratios))
     plain = parse_scans(as_table(ROWS), [replace(PLACE, features=None)], Conventions({}, {}))
     assert plain.unused == ("class", "size_km")
     with pytest.raises(InputError, match=r"row 1, column 'class': expected one of 'small', 'large', or an empty cell"):
@@ -116,8 +117,8 @@ def test_merged_rows_have_the_mean_ratio_and_a_class_only_if_they_agree() -> Non
         scan, accuracy = (each[0][0] for each in (found.scans, found.accuracy))
         assert scan is not None
         assert accuracy is not None
-        kept = [0, 1, *range(5, before.shape[1])]  # all but the noise, which grows by the spread
-        np.testing.assert_allclose(scan[:, kept], before[:, kept].mean(axis=0, keepdims=True))
+        for name in ("values", "class_ratios"):
+            np.testing.assert_allclose(getattr(scan, name), getattr(before, name).mean(axis=0, keepdims=True))
         np.testing.assert_array_equal(accuracy[:, 0], [expected])
 
 
@@ -215,8 +216,8 @@ def test_lines_have_classes_and_sizes() -> None:
     given = line(**{"class": ["small", None], "size_m": [None, 40.0]})
     scan = read_message(given, "line 1", [PLACE], Conventions({}, {})).scan.measurements
     ratios = [CAMERA.log_ratios(0), CAMERA.log_ratios(size=40.0)]
-    expected = with_row_noise([[1.0, 5.0], [200.0, 6.0]], np.zeros((2, 2)), None, None, ratios)
-    np.testing.assert_allclose(scan, expected)
+    expected = ScanRows([[1.0, 5.0], [200.0, 6.0]], class_ratios=ratios)
+    assert_same_rows(scan, expected)
 
 
 @pytest.mark.parametrize(

@@ -14,8 +14,8 @@ from vedette.calibration.calibrating import Calibration, calibrate
 from vedette.calibration.parameters import Parameter, Problem
 from vedette.internal.quantities import COMPONENTS
 from vedette.kernels.base.types import Floats
-from vedette.kernels.gaussian.row_noise import row_length
 from vedette.models.arguments import float_array, instance, positive
+from vedette.models.scan_rows import values_of, with_values
 from vedette.recorded.scan_times import RecordedScan, group_by_time, poses_at_sites, remove_bias
 from vedette.tracking import SensorScan
 from vedette.tracking.out_of_sequence import copy_scan, scan_name
@@ -163,9 +163,9 @@ class OnlineBiasEstimator:
     def _checked(self, scan: SensorScan) -> SensorScan:
         own = copy_scan(scan, len(self.problem.sites))
         dim = len(COMPONENTS[self.problem.sites[own.sensor].kind])
-        measured = own.measurements if own.measurements.size else np.empty((0, dim))
-        length = row_length(dim) if measured.shape[-1] == row_length(dim) else dim
-        return replace(own, measurements=float_array(f"{scan_name(own)}: scan", measured, (None, length)))
+        measured = values_of(own.measurements) if len(own.measurements) else np.empty((0, dim))
+        values = float_array(f"{scan_name(own)}: scan", measured, (None, dim))
+        return replace(own, measurements=with_values(own.measurements, values))
 
     def biases(self, state: BiasEstimatorState, time: float) -> Floats:
         """(num_parameters,) values of the parameters at a time.

@@ -16,8 +16,7 @@ from scipy.optimize import linear_sum_assignment
 from vedette.densities import as_lmb, track_moments
 from vedette.internal.quantities import COMPONENTS, HEIGHT_DEPENDENT, is_position
 from vedette.kernels.base.types import HEIGHT, OWN_HEIGHT, Bools, Floats, Ints
-from vedette.kernels.gaussian.row_noise import MISSING
-from vedette.models.row_noise import measured_part, noise_of_rows
+from vedette.models.scan_rows import ScanLike, ScanRows
 from vedette.recorded import RecordedScans, RecordedSensor
 from vedette.recorded.scan_times import with_wrapped_angles
 from vedette.tracking import Tracker
@@ -110,11 +109,10 @@ def match_measurements(
     )
 
 
-def _fitted_part(scan: Floats, kind: str) -> Floats:
+def _fitted_part(scan: ScanLike, kind: str) -> Floats:
     """(num, num_fitted) components of measurements that are fitted, NaN where a row lacks one."""
-    dim = len(COMPONENTS[kind])
-    variances = np.diagonal(noise_of_rows(scan, np.zeros((len(scan), dim, dim))), axis1=1, axis2=2)
-    return np.where(variances < MISSING, measured_part(scan, dim), math.nan)[:, : len(fitted(kind))]
+    values = np.where(scan.missing, math.nan, scan.values) if isinstance(scan, ScanRows) else scan
+    return values[:, : len(fitted(kind))]
 
 
 def _moved(states: Floats, seconds: Floats) -> Floats:

@@ -13,7 +13,7 @@ from vedette.densities import Estimate
 from vedette.kernels.base.types import Bools, Floats, Ints
 from vedette.models.measurement import wrap_periodic
 from vedette.models.motion import MotionModel
-from vedette.models.row_noise import measured_part, noise_of_rows
+from vedette.models.scan_rows import ScanLike, noise_of_rows, values_of
 from vedette.models.sensor import SensorModel
 from vedette.scenarios import Scenario
 
@@ -48,7 +48,7 @@ class Instant(NamedTuple):
 
     time: float
     poses: Floats
-    rows: Sequence[Floats | None]
+    rows: Sequence[ScanLike | None]
     estimate: Estimate
 
 
@@ -173,13 +173,13 @@ def _linearised(
 
 
 def _of_scan(
-    sensor: SensorModel, raw: Floats, pose: Floats, labels: Ints, means: Floats, covs: Floats
+    sensor: SensorModel, raw: ScanLike, pose: Floats, labels: Ints, means: Floats, covs: Floats
 ) -> tuple[SensorFit, Floats, Bools]:
     """Return the fit of a scan, the probabilities of detection of the tracks, and whether they have measurements.
 
     raw: measurements, with the noise of each if they bring any.
     """
-    measured, periods = measured_part(raw, sensor.meas_dim), sensor.measurement.periods
+    measured, periods = values_of(raw), sensor.measurement.periods
     matches, explained = Matches.none(sensor.meas_dim), np.asarray(np.zeros(len(measured), np.bool_))
     probabilities, numbers, further = np.empty(0), np.empty(0, np.int64), np.zeros((1, 2))
     if len(labels):

@@ -12,9 +12,8 @@ import numpy as np
 from vedette.errors import InputError
 from vedette.internal.quantities import COMPONENTS, HEIGHT_DEPENDENT, PLACED, QUANTITIES, is_doppler, si_column
 from vedette.kernels.base.types import BEAM, OWN_HEIGHT, OWN_VELOCITY, Floats
-from vedette.kernels.gaussian.row_noise import MISSING
 from vedette.models.arguments import reject
-from vedette.models.row_noise import measured_part, noise_of_rows
+from vedette.models.scan_rows import ScanLike, ScanRows, values_of
 from vedette.models.turns import is_turn, lags
 from vedette.platforms.compass import course_deg
 from vedette.recorded import RecordedScans
@@ -46,7 +45,7 @@ PLANE_SHAPES: dict[str, str] = {
     "range_only": "circle",
 }
 Scans: TypeAlias = tuple[tuple[Scan | None, ...], ...]
-Rows: TypeAlias = tuple[tuple[Floats | None, ...], ...]
+Rows: TypeAlias = tuple[tuple[ScanLike | None, ...], ...]
 
 
 def measurement_code(scenario: Scenario) -> tuple[str, ...]:
@@ -102,12 +101,8 @@ def _recording_of(record: RunRecord, section: RecordingSection, scenario: Scenar
 
 def _recorded(record: RunRecord, section: RecordingSection, scenario: Scenario) -> Scans:
     recording = _recording_of(record, section, scenario)
-    dims = [len(COMPONENTS[sensor.measurement.kind]) for sensor in scenario.model.sensors]
     return tuple(
-        tuple(
-            None if scan is None else Scan(measured_part(scan, dim), np.full(len(scan), UNKNOWN))
-            for dim, scan in zip(dims, scans, strict=True)
-        )
+        tuple(None if scan is None else Scan(values_of(scan), np.full(len(scan), UNKNOWN)) for scan in scans)
         for scans in recording.scans[: record.num_scans]
     )
 
@@ -190,12 +185,10 @@ def _accuracy_cells(
 
     reports: names of the classes that the sensor reports.
     """
-    scan, accuracy, dim = recording.scans[k][s], recording.accuracy[k][s], len(columns)
+    scan, accuracy = recording.scans[k][s], recording.accuracy[k][s]
     assert scan is not None
-    variances = np.diagonal(noise_of_rows(scan, np.zeros((len(scan), dim, dim))), axis1=1, axis2=2)
-    all_cells: list[dict[str, Any]] = [
-        {columns[i]: None for i in np.flatnonzero(row >= MISSING).tolist()} for row in variances
-    ]
+    missing = scan.missing if isinstance(scan, ScanRows) else np.zeros(scan.shape, np.bool_)
+    all_cells: list[dict[str, Any]] = [{columns[i]: None for i in np.flatnonzero(row).tolist()} for row in missing]
     if accuracy is not None:
         names = [_accuracy_column(name) for name in recording.accuracy_columns[s]]
         for cells, values in zip(all_cells, accuracy.tolist(), strict=True):

@@ -24,7 +24,7 @@ from vedette.filters.limits import Limits, limits_for_births
 from vedette.filters.protocols import FilterInfo
 from vedette.internal.representation import SummaryRepr
 from vedette.kernels.association.truncation import Truncation
-from vedette.kernels.base.types import Floats, Ints, Lmb, Motion, ScanInput, Sensor
+from vedette.kernels.base.types import Ints, Lmb, Measurements, Motion, ScanInput, Sensor
 from vedette.models import (
     SensorModel,
     TargetModel,
@@ -35,6 +35,7 @@ from vedette.models import (
     position,
 )
 from vedette.models.arguments import generator, pose_vector, positive, step_number
+from vedette.models.scan_rows import to_measurements
 from vedette.models.sensor import with_default_detection_at
 
 BeliefT = TypeVar("BeliefT", bound=LabelledDensity)
@@ -69,7 +70,7 @@ def blind_sensor() -> SensorModel:
     )
 
 
-NO_SCAN = np.empty((0, 2))
+NO_SCAN = to_measurements(np.empty((0, 2)))
 NO_POSE = np.zeros(3)
 
 
@@ -123,7 +124,7 @@ class SingleSensorFilter(WithBirths):
     def _inputs_after(
         self,
         dt: Any,
-        scan: Floats,
+        scan: Measurements,
         pose: Any,
         step: Any,
         prior: LabelledDensity | None = None,
@@ -141,7 +142,7 @@ class SingleSensorFilter(WithBirths):
         born = self._births(period, step, prior, births)
         return ScanInput(born, scan, pose_vector("pose", pose), period), motion, sensor, truncation
 
-    def _update_inputs(self, scan: Floats, pose: Any) -> StepInputs:
+    def _update_inputs(self, scan: Measurements, pose: Any) -> StepInputs:
         """Return the inputs of `_inputs_after` for a scan at the time of the prior."""
         _, sensor, truncation = _models(self.targets, self.sensor, self.limits)
         given = ScanInput(no_births_for_kernel(self.targets.state_dim), scan, pose_vector("pose", pose), 0.0)
@@ -203,7 +204,8 @@ class LabelledFilter(SingleSensorFilter, LabelledFilterBase[BeliefT]):
 
         Args:
             belief: posterior of the previous step.
-            scan: (num, meas_dim) measurements in any order, with angles in radians, in (-pi, pi].
+            scan: (num, meas_dim) measurements in any order, with angles in radians, in (-pi, pi], or
+                `vedette.models.ScanRows`, which bring their noise.
             pose: (3 or more,) [px, py, heading_rad, ...] of the sensor.
             dt: seconds since the previous step. 0 is the same as `update`: no motion, deaths or births.
             step: number of this step, from 1 on. Births at the sites of the targets' model are labelled with it.

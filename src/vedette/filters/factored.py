@@ -124,12 +124,12 @@ class _FactoredFilterBase(LabelledFilterBase[FactoredGLMB]):
         factoring = _factoring(self.max_split_error, self.max_factor_labels, step.num_scans, max_merging)
         before, undetected = no_undetected(birth), prior.undetected
         if undetected is not None:
-            before = before_scan(undetected, birth, step.sensor, scan.measurements, scan.pose)
+            before = before_scan(undetected, birth, step.sensor, scan.measurements.values, scan.pose)
         density, missed, left, report = step_factored(
             prior.density, before, prior.arrivals, *step.inputs, reduction, factoring
         )
         if undetected is not None:
-            undetected = after_scan(undetected, missed, left, len(scan.measurements))
+            undetected = after_scan(undetected, missed, left, len(scan.measurements.values))
         return _Before(density, undetected, prior.arrivals, prior.error), report
 
     def _check(self, posterior: Any, report: FactoredReport, place: str) -> float:

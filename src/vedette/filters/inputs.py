@@ -18,15 +18,14 @@ from vedette.densities.containers import unchecked
 from vedette.densities.tracks import gaussian_tracks, relabelled_tracks
 from vedette.errors import InputError, ModelError, VedetteError
 from vedette.internal.unit_warnings import warn_implausible
-from vedette.kernels.base.types import Floats, Ints, Lmb
+from vedette.kernels.base.types import Floats, Ints, Lmb, Measurements
 from vedette.kernels.gaussian.marks import taken_marks
-from vedette.kernels.gaussian.row_noise import row_length
 from vedette.kernels.gaussian.scans import examined_scan
 from vedette.kernels.labelled import births as kernels
 from vedette.models import BirthModel, SensorModel, TargetModel
 from vedette.models.arguments import as_array, reject, step_number
 from vedette.models.measurement import MeasurementModel, wrap_periodic
-from vedette.models.row_noise import check_row_noise, measured_part
+from vedette.models.scan_rows import ScanRows, table_of, to_measurements, with_values
 
 _WITHIN = 0.9995  # half periods; components beyond may need to be wrapped
 _MOST_STDS = 10.0  # standard deviations of noise below the least noise-free measurement
@@ -35,12 +34,12 @@ _PACKAGE = Path(__file__).parents[1]
 _Density = TypeVar("_Density", GLMB, LMB, FactoredGLMB, Poisson, IidCluster, MultiBernoulli)
 
 
-def check_scan(scan: Any, sensor: SensorModel, num_classes: int) -> tuple[Floats, Ints]:
-    """Return the scan as a contiguous (num, meas_dim) array without repeated rows, and the rows that were repeats.
+def check_scan(scan: Any, sensor: SensorModel, num_classes: int) -> tuple[Measurements, Ints]:
+    """Return the scan in kernel form without repeated rows, and the rows that were repeats.
 
-    Rows that bring their noise (`vedette.models.with_row_noise`) are longer. Angles are returned in (-pi, pi], and
-    other components with a period within half of it. num_classes: number of classes of the targets. Warns of values too
-    far below the least possible value for noise, such as a negative range.
+    scan: (num, meas_dim) array, or `vedette.models.ScanRows`. Angles are returned in (-pi, pi], and other components
+    with a period within half of it. num_classes: number of classes of the targets. Warns of values too far below the
+    least possible value for noise, such as a negative range.
 
     Raises:
         InputError: not an array of that shape, a value that is not finite, or an angle beyond a full turn either way,
@@ -51,37 +50,33 @@ def check_scan(scan: Any, sensor: SensorModel, num_classes: int) -> tuple[Floats
     expected = f"an array of shape (num_measurements, {meas_dim}), empty for a scan without measurements"
     if scan is None:
         raise InputError(f"scan: expected {expected}; got None")
-    given = scan
-    if type(scan) is not np.ndarray or scan.dtype != np.float64:
-        given = as_array("scan", scan, "fiu", f"numbers in {expected}")
+    given = scan.values if isinstance(scan, ScanRows) else scan
+    if type(given) is not np.ndarray or given.dtype != np.float64:
+        given = as_array("scan", given, "fiu", f"numbers in {expected}")
     if given.size == 0 and given.ndim <= 2:
-        return np.empty((0, meas_dim)), _NO_ROWS
-    brings_noise = given.ndim == 2 and given.shape[1] != meas_dim
-    if given.ndim != 2 or (brings_noise and given.shape[1] - row_length(meas_dim) not in (0, num_classes)):
-        longer = given.ndim == 2 and given.shape[1] > row_length(meas_dim)
-        classes = f"; its targets have {num_classes} classes" if longer else ""
-        raise InputError(f"scan: expected {expected}; got shape {given.shape}{classes}")
+        return to_measurements(np.empty((0, meas_dim))), _NO_ROWS
+    if given.ndim != 2 or given.shape[1] != meas_dim:
+        raise InputError(f"scan: expected {expected}; got shape {given.shape}")
+    if isinstance(scan, ScanRows) and scan.class_ratios.shape[1] not in (0, num_classes):
+        ratios = f"class ratios of {num_classes} classes, as the targets have"
+        raise InputError(f"scan: expected {ratios}; got those of {scan.class_ratios.shape[1]}")
     array = np.array(given, dtype=np.float64, order="C")
     bad, is_below, largest, may_repeat = examined_scan(array, measurement.least, measurement.periods)
     if bad >= 0:
         raise InputError(f"scan: expected finite numbers; got {array[bad].tolist()} in row {bad}")
-    if brings_noise:
-        check_row_noise("scan", array, meas_dim)
     if is_below:
         _warn_negative(array, measurement, sensor.noise.least_stds)
     if largest > _WITHIN:  # rare
         array, may_repeat = _wrapped(array, measurement), True
+    rows = with_values(scan, array)
     if not may_repeat:  # most scans
-        return array, _NO_ROWS
-    _, first = np.unique(array, axis=0, return_index=True)
-    repeats = np.setdiff1d(np.arange(len(array)), first)
-    return np.delete(array, repeats, axis=0), repeats
+        return to_measurements(rows), _NO_ROWS
+    first = np.sort(np.unique(table_of(rows), axis=0, return_index=True)[1])
+    return to_measurements(rows[first]), np.setdiff1d(np.arange(len(rows)), first)
 
 
 def _warn_negative(scan: Floats, measurement: MeasurementModel, stds: Floats | None) -> None:
-    below = measurement.least - measured_part(scan, measurement.meas_dim) > _MOST_STDS * (
-        np.inf if stds is None else stds
-    )
+    below = measurement.least - scan > _MOST_STDS * (np.inf if stds is None else stds)
     for row, component in np.argwhere(below)[:1].tolist():
         got = f"{scan[row, component]:g} in row {row}, component {component}"
         least = f"at least {measurement.least[component]:g}, but for noise"
@@ -89,15 +84,15 @@ def _warn_negative(scan: Floats, measurement: MeasurementModel, stds: Floats | N
 
 
 def _wrapped(scan: Floats, measurement: MeasurementModel) -> Floats:
-    angular, measured = measurement.angular, measured_part(scan, measurement.meas_dim)
-    sizes = np.abs(measured[:, angular])
+    angular = measurement.angular
+    sizes = np.abs(scan[:, angular])
     if sizes.max(initial=0.0) > 2.0 * math.pi:
         row = int(np.argmax(sizes.max(axis=1)))
         raise InputError(
             f"scan: expected angles in radians, in (-pi, pi]; got {scan[row].tolist()} in row {row}, whose component "
             f"{int(np.flatnonzero(angular)[np.argmax(sizes[row])])} is an angle (is it in degrees?)"
         )
-    return np.column_stack([wrap_periodic(measured, measurement.periods), scan[:, len(angular) :]])
+    return wrap_periodic(scan, measurement.periods)
 
 
 def check_belief(

@@ -23,7 +23,7 @@ from vedette.filters.base import (
 from vedette.filters.inputs import check_belief, check_scan, is_zero_duration, model_errors, no_births_for_kernel
 from vedette.filters.limits import Limits
 from vedette.filters.protocols import FilterInfo
-from vedette.kernels.base.types import Bools, Floats, Ints, Lmb, Motion, ScanInput
+from vedette.kernels.base.types import Bools, Floats, Ints, Lmb, Measurements, Motion, ScanInput
 from vedette.models import SensorModel, TargetModel, kernel_motion
 from vedette.models.arguments import generator, one_a_sensor, pose_vector, positive, reject, step_number
 from vedette.models.sensor import with_default_detection_at
@@ -34,7 +34,7 @@ class SensorScans(NamedTuple):
 
     names: list[str]
     sensors: list[SensorModel]
-    scans: list[Floats]
+    scans: list[Measurements]
     poses: list[Floats]
     repeats: list[Ints]  # rows of each scan that repeat another; empty if no sensor scanned
 

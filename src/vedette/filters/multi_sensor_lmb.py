@@ -54,7 +54,7 @@ class MultiSensorLmbFilter(LmbFilterBase, MultiSensorFilter[LMB]):
                 combinations, report = extend_combinations(
                     combinations, s, num_columns, scan, sensor.to_kernel(), truncation
                 )
-                num_columns += len(scan.measurements)
+                num_columns += len(scan.measurements.values)
                 reports.append(report)
             posterior, joint = lmb_of_combinations(combinations, num_columns, truncation, reduction)
         sums = joint.sums._replace(log_kept=joint.sums.log_kept + sum(report.log_kept for report in reports))

@@ -13,13 +13,13 @@ from vedette.densities import Estimator
 from vedette.errors import VedetteError
 from vedette.evaluation.innovations import Assumed
 from vedette.evaluation.track_formats import utc_text
-from vedette.internal.quantities import COMPONENTS, HEIGHT_DEPENDENT, PLACED
+from vedette.internal.quantities import HEIGHT_DEPENDENT, PLACED
 from vedette.kernels.base.types import Floats
 from vedette.live.answers import Answer, plan_answer, track_answers
 from vedette.live.fit import LiveFit
 from vedette.live.messages import Message, read_message
 from vedette.models.arguments import reject
-from vedette.models.row_noise import measured_part
+from vedette.models.scan_rows import as_scan
 from vedette.platforms.compass import Compass, PlaneCompass
 from vedette.recorded import Conventions, Origin, RecordedSensor
 from vedette.recorded.extents import beyond_reach, is_within, places_of
@@ -173,14 +173,14 @@ class LiveLoop:
         site, pose = self.sites[scan.sensor], np.asarray(scan.pose)
         if self.valid_area is None or site.kind not in PLACED:
             return scan, 0
-        rows = np.asarray(scan.measurements, np.float64)
-        places = places_of(measured_part(rows, len(COMPONENTS[site.kind])), pose, site.kind)
+        rows = as_scan(scan.measurements)
+        places = places_of(rows, pose, site.kind)
         inside = is_within(places, self.valid_area) & ~beyond_reach(places, pose[:2], site.reach)
         return replace(scan, measurements=rows[inside]), int(np.count_nonzero(~inside))
 
     def _merge_returns(self, state: LiveState, scan: SensorScan) -> tuple[LiveState, SensorScan]:
         """Return the scan with one measurement a target. Its noise grows by the spread of all returns so far."""
-        s, rows = scan.sensor, np.asarray(scan.measurements, np.float64)
+        s, rows = scan.sensor, as_scan(scan.measurements)
         if not self.extents or self.extents[s] <= 0.0 or not len(rows):
             return state, scan
         kind = self.sites[s].kind

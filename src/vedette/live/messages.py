@@ -16,6 +16,7 @@ from vedette.internal.text import pluralise, shown
 from vedette.kernels.base.types import BEAM, OWN_VELOCITY, Floats
 from vedette.models.arguments import reject
 from vedette.models.pose_noise import pose_stds_of
+from vedette.models.scan_rows import ScanLike
 from vedette.models.turns import Turn, with_beam
 from vedette.recorded import Conventions, Origin, RecordedSensor, parse_scans
 from vedette.recorded.conventions import GAPS
@@ -130,7 +131,7 @@ def _lags(given: Any, place: str, num: int, time: float, is_utc: bool) -> Floats
         raise reject(place, wanted, given) from None
 
 
-def _with_beam(pose: Floats, scan: Floats, lags: Floats, site: RecordedSensor, place: str) -> Floats:
+def _with_beam(pose: Floats, scan: ScanLike, lags: Floats, site: RecordedSensor, place: str) -> Floats:
     """Return the pose with the bearing of the beam at the middle of the turn, from the measurements and their times."""
     if not isinstance(site.turn, Turn):
         raise reject(place, f"none, as the sensors file gives no `turn` of {site.name}", "some")

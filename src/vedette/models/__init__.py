@@ -29,9 +29,10 @@ from vedette.models.noise import axis_noise, constant_noise, range_dependent_noi
 from vedette.models.polar import bearing_only, bearing_range, bearing_range_rate, range_only
 from vedette.models.region import Region
 from vedette.models.region_clutter import region_clutter
-from vedette.models.row_noise import SignalModel, with_row_noise
+from vedette.models.scan_rows import ScanRows
 from vedette.models.sensor import SensorModel
 from vedette.models.sensor_clutter import around_sensor
+from vedette.models.signal import SignalModel
 from vedette.models.targets import TargetModel
 from vedette.models.undetected import UndetectedModel
 
@@ -50,6 +51,7 @@ __all__ = [
     "MotionModel",
     "NoiseModel",
     "Region",
+    "ScanRows",
     "SensorModel",
     "SignalModel",
     "SurvivalModel",
@@ -82,5 +84,4 @@ __all__ = [
     "range_only",
     "region_clutter",
     "soft_sector",
-    "with_row_noise",
 ]

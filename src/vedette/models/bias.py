@@ -59,11 +59,9 @@ NO_BIAS = Bias()
 def with_offsets(measured: Floats, offsets: Floats, components: Sequence[str]) -> Floats:
     """Return (num, meas_dim) measurements plus (meas_dim,) offsets, angles in (-pi, pi], ranges >= `LEAST_RANGE`.
 
-    Rows may bring their noise, which stays.
     components: names of the measured quantities in `vedette.internal.quantities.QUANTITIES`.
     """
-    shifted = measured.copy()
-    shifted[:, : len(offsets)] += offsets
+    shifted = measured + offsets
     for i, name in enumerate(components):
         quantity = QUANTITIES[name]
         least = quantity.least + LEAST_RANGE

@@ -106,7 +106,7 @@ class BirthModel:
         period: time in s for which birth probabilities are given, also those from measurements. None: each step,
             whatever its length (the paper).
         class_probs: (num_classes,) probability of each class of target, which sum to 1. None: targets have no classes.
-            The classes of a sensor's measurements are in the same order (`vedette.models.with_row_noise`).
+            The classes of a sensor's measurements are in the same order (`vedette.models.ScanRows`).
         num_sites: number of birth sites.
         state_dim: length of a target's state.
 

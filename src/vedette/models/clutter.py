@@ -14,7 +14,6 @@ from vedette.errors import InputError, ModelError
 from vedette.internal.quantities import COMPONENTS, HEIGHT_DEPENDENT, QUANTITIES, is_doppler
 from vedette.kernels.base.compile import inlined
 from vedette.kernels.base.types import Bools, Floats
-from vedette.kernels.gaussian.row_noise import is_missing
 from vedette.models.arguments import (
     dimension,
     float_array,
@@ -50,7 +49,8 @@ class ClutterModel:
 
     Attributes:
         rate: expected number of clutter measurements per scan.
-        log_intensity: model function of kind `log_clutter_intensity`. It integrates to `rate` over measurement space.
+        log_intensity: model function of kind `log_clutter_intensity`. It integrates to `rate` over measurement space. A
+            component that a row of `ScanRows` lacks is NaN there, and its density that of the other components.
         params: its parameter vector.
         sampler: draws a scan of clutter, see `ClutterSampler`. None if no scans are simulated.
         meas_dim: number of measurement components. None: not known.
@@ -129,7 +129,7 @@ def _box(measurement: Floats, pose: Floats, params: Floats) -> float:
     dim, level = params.shape[0] // 3, params[0]
     for i in range(dim):
         low, width, period = params[1 + i], params[1 + dim + i], params[1 + 2 * dim + i]
-        if is_missing(measurement, i, dim):
+        if math.isnan(measurement[i]):
             level += math.log(width)
             continue
         offset = measurement[i] - low
@@ -195,7 +195,7 @@ def log_density_of_rate(measurement: Floats, params: Floats) -> float:
 
     params: end with `plane_params`.
     """
-    if is_missing(measurement, 2, 3):
+    if math.isnan(measurement[2]):
         return 0.0
     return -math.log(2.0 * params[-6]) if abs(measurement[2] + params[-3]) <= params[-6] else -math.inf
 

@@ -18,7 +18,6 @@ from vedette.models.arguments import dimension, float_array, params_vector, pose
 from vedette.models.fields import part
 from vedette.models.functions import ModelFunction, model_function, require_kind, write_rows
 from vedette.models.probe import probe_array, probe_covariance, probe_jacobian
-from vedette.models.row_noise import measured_part
 
 
 @model_function("measurement")
@@ -164,11 +163,8 @@ class MeasurementModel:
         return self._located(measurements, pose)[:, :2]
 
     def states_at(self, measurements: Floats, pose: ArrayLike, state_dim: int) -> Floats:
-        """Return (n, state_dim) states at rest where (n, meas_dim) measurements were taken. Raises like `positions`.
-
-        Rows may bring their noise (`vedette.models.with_row_noise`).
-        """
-        located = self._located(measured_part(measurements, self.meas_dim), pose)
+        """Return (n, state_dim) states at rest where (n, meas_dim) measurements were taken. Raises like `positions`."""
+        located = self._located(measurements, pose)
         states = np.zeros((len(located), state_dim))
         states[:, :2] = located[:, :2]
         if located.shape[1] > 2 and state_dim > HEIGHT:

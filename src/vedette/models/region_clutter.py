@@ -15,7 +15,6 @@ from vedette.internal.quantities import HEIGHT_DEPENDENT
 from vedette.kernels.base.compile import inlined, kernel
 from vedette.kernels.base.types import HEIGHT, Floats
 from vedette.kernels.gaussian.beam import own_height, own_place
-from vedette.kernels.gaussian.row_noise import is_missing
 from vedette.models.arguments import non_negative, one_of, reject
 from vedette.models.clutter import (
     ClutterModel,
@@ -150,7 +149,7 @@ def _at_height(bearing: float, ground: float, height: float, pose: Floats, param
 
 @model_function("log_clutter_intensity")
 def _bearing_range_elevation(measurement: Floats, pose: Floats, params: Floats) -> float:
-    if is_missing(measurement, 2, 3):
+    if math.isnan(measurement[2]):
         return _at_slant_range(measurement, pose, params)
     distance, elevation = measurement[1] + params[7], measurement[2] + params[8]
     ground = distance * math.cos(elevation)
@@ -162,7 +161,7 @@ def _bearing_range_elevation(measurement: Floats, pose: Floats, params: Floats) 
 
 @model_function("log_clutter_intensity")
 def _bearing_range_altitude(measurement: Floats, pose: Floats, params: Floats) -> float:
-    if is_missing(measurement, 2, 3):
+    if math.isnan(measurement[2]):
         return _at_slant_range(measurement, pose, params)
     distance, height = measurement[1] + params[7], measurement[2] + params[8]
     square = distance * distance - (height - own_height(pose)) ** 2
@@ -174,7 +173,7 @@ def _bearing_range_altitude(measurement: Floats, pose: Floats, params: Floats) -
 @model_function("log_clutter_intensity")
 def _position_altitude(measurement: Floats, pose: Floats, params: Floats) -> float:
     inside = _inside(measurement[0] + params[6], measurement[1] + params[7], params)
-    if inside and is_missing(measurement, 2, 3):
+    if inside and math.isnan(measurement[2]):
         return params[0]  # type: ignore[no-any-return]
     if not (inside and 0.0 <= measurement[2] + params[8] <= params[5]):
         return -math.inf

@@ -8,6 +8,7 @@ from numpy.typing import ArrayLike
 from vedette.internal.quantities import PLACED, is_position
 from vedette.kernels.base.types import Bools, Floats
 from vedette.models.heights import PLACES_WITH_HEIGHT
+from vedette.models.scan_rows import ScanLike, values_of
 from vedette.models.turns import own_places
 
 MARGIN = 0.05  # around an extent, as a share of its longer side
@@ -16,19 +17,21 @@ _FEWEST, _FEWEST_TIMES = 20, 10  # rows and times of a recording; with fewer, no
 _MOST_WILD = 50  # one row in this number may be wild on a side
 
 
-def places_of(scan: Floats, pose: Floats, kind: str) -> Floats:
+def places_of(scan: ScanLike, pose: Floats, kind: str) -> Floats:
     """Return the (num, 2) places in m of a scan by a sensor at a pose, or none if the kind measures no places.
 
     Slant ranges without a height count as ranges in the plane.
     """
     if kind not in PLACED:
         return np.empty((0, 2))
+    measured = values_of(scan)
     if is_position(kind):
-        return scan[:, :2]
+        return measured[:, :2]
     if kind in PLACES_WITH_HEIGHT:
-        return PLACES_WITH_HEIGHT[kind](scan, pose)[:, :2]
-    away = scan[:, 1:2] * np.column_stack([np.cos(scan[:, 0]), np.sin(scan[:, 0])])
-    return np.asarray(own_places(scan[:, 0], pose) + away)
+        return PLACES_WITH_HEIGHT[kind](measured, pose)[:, :2]
+    bearings = measured[:, 0]
+    away = measured[:, 1:2] * np.column_stack([np.cos(bearings), np.sin(bearings)])
+    return np.asarray(own_places(bearings, pose) + away)
 
 
 def box_of(places: Floats, share: float = MARGIN) -> Floats:

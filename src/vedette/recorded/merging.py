@@ -9,9 +9,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from vedette.internal.quantities import COMPONENTS, is_position
+from vedette.internal.quantities import is_position
 from vedette.kernels.base.types import Floats, Ints
-from vedette.models.row_noise import with_added_noise
+from vedette.models.scan_rows import ScanLike, ScanRows, values_of, with_added_noise
 from vedette.recorded.extents import places_of
 from vedette.recorded.returns import Extent, groups
 from vedette.recorded.scan_times import RecordedScans, RecordedSensor, with_wrapped_angles
@@ -31,9 +31,9 @@ class Spread(NamedTuple):
         """Standard deviation of a return on each axis, m, or 0 without returns."""
         return math.sqrt(self.squares / (2 * max(self.num, 1)))
 
-    def added_to(self, scan: Floats, kind: str) -> Floats:
+    def added_to(self, scan: ScanLike, kind: str) -> ScanRows:
         """Return the scan with noise that has grown by that of a single return."""
-        return with_added_noise(scan, _spread_covs(scan, kind, len(COMPONENTS[kind]), self.std))
+        return with_added_noise(scan, _spread_covs(values_of(scan), kind, self.std))
 
 
 def merged(
@@ -72,7 +72,7 @@ def merged(
     return replace(recording, scans=tuple(map(tuple, scans)), accuracy=tuple(map(tuple, accuracy)), notes=notes)
 
 
-def merged_scan(scan: Floats, pose: Floats, kind: str, distance: float) -> tuple[Floats, Ints, Spread]:
+def merged_scan(scan: ScanLike, pose: Floats, kind: str, distance: float) -> tuple[ScanLike, Ints, Spread]:
     """Return the means of the returns of each target in a scan, the target of each return, and their spread."""
     places = places_of(scan, pose, kind)
     clusters = groups(places, distance)
@@ -81,9 +81,9 @@ def merged_scan(scan: Floats, pose: Floats, kind: str, distance: float) -> tuple
     return means, clusters, Spread(len(scan), float((offsets**2).sum()))
 
 
-def _spread_covs(scan: Floats, kind: str, dim: int, spread: float) -> Floats:
+def _spread_covs(scan: Floats, kind: str, spread: float) -> Floats:
     """Return the covariance of a place with a standard deviation in m, in the components of measurements."""
-    covs = np.zeros((len(scan), dim, dim))
+    covs = np.zeros((*scan.shape, scan.shape[1]))
     covs[:, 1, 1] = spread**2
     covs[:, 0, 0] = spread**2 if is_position(kind) else (spread / np.maximum(scan[:, 1], spread)) ** 2
     return covs
@@ -106,13 +106,16 @@ def _mean_accuracy(accuracy: Floats, columns: Sequence[str], clusters: Ints) -> 
     return np.where(is_std, np.sqrt(np.where(is_std, means, 1.0)), means)
 
 
-def _means(scan: Floats, kind: str, clusters: Ints) -> Floats:
+def _means(scan: ScanLike, kind: str, clusters: Ints) -> ScanLike:
     """Return the mean of each cluster of a scan.
 
-    Noise that rows bring is averaged, too: the measurements of an extended target are not independent.
+    What rows bring is averaged, too: the measurements of an extended target are not independent.
     """
-    means = list[Floats]()
-    for cluster in range(int(clusters.max(initial=-1)) + 1):
-        own = scan[clusters == cluster]
-        means.append(with_wrapped_angles(own[:1] + with_wrapped_angles(own - own[0], kind).mean(axis=0), kind)[0])
-    return np.array(means).reshape(-1, scan.shape[1])
+    values, members = values_of(scan), [clusters == cluster for cluster in range(int(clusters.max(initial=-1)) + 1)]
+    means = np.empty((len(members), values.shape[1]))
+    for mean, own in zip(means, (values[each] for each in members), strict=True):
+        mean[:] = with_wrapped_angles(own[0] + with_wrapped_angles(own - own[0], kind).mean(axis=0), kind)
+    if not isinstance(scan, ScanRows):
+        return means
+    brought = scan.to_kernel()[1:]
+    return ScanRows(means, *(np.array([x[own].mean(axis=0) for own in members]) if len(x) else None for x in brought))

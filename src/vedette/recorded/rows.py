@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -12,9 +13,8 @@ from vedette.errors import InputError
 from vedette.internal.covariances import SMALLEST_VARIANCE
 from vedette.internal.quantities import ANGLES, COMPONENTS, HEIGHT_DEPENDENT, QUANTITIES, is_doppler, is_position
 from vedette.internal.text import pluralise, shown
-from vedette.kernels.base.types import OWN_HEIGHT, OWN_VELOCITY
+from vedette.kernels.base.types import OWN_HEIGHT, OWN_VELOCITY, Floats
 from vedette.models.pose_noise import PoseStds, pose_noise
-from vedette.models.row_noise import row_noise
 from vedette.recorded.columns import ScanColumns
 from vedette.recorded.conventions import GAPS, MOST, ONE_PLACE, ONE_PLACE_SHARE, OVER_A_TURN, OWN_SPEEDS, UNITS
 from vedette.recorded.geography import PLANE_REACH
@@ -24,14 +24,24 @@ from vedette.recorded.tables import FARTHEST, LATEST, across_midnight, is_empty,
 _OWN_POSE = ("own_x", "own_y", "own_lon", "own_lat", "own_heading")
 
 
+class Brought(NamedTuple):
+    """What a row brings with its measurement, see `vedette.models.ScanRows`."""
+
+    noise: Floats  # (m, m)
+    added_noise: Floats  # (m, m)
+    log_ratio: float
+    class_ratios: tuple[float, ...]  # of each class, or () if the features of classes are not measured
+
+
 @dataclass(frozen=True, slots=True)
 class Row:
-    """A row: its index in the table, time, sensor, measurement for filters (None: empty), pose, accuracy."""
+    """A row: index in the table, time, sensor, measurement for filters (None: empty) with noise, pose, accuracy."""
 
     index: int
     time: float
     sensor: int
     measured: tuple[float, ...] | None
+    brought: Brought | None
     pose: tuple[float, ...]
     accuracy: tuple[float, ...]
 
@@ -70,7 +80,9 @@ class Rows(ScanColumns):
         s = self._site(i)
         time, pose = self._seconds(i), self._pose(i, s)
         accuracy = {name: self._accuracy_value(i, s, name) for name in self.accuracy[s] or ()}
-        return Row(i, time, s, self._measured(i, s, pose, accuracy), pose, tuple(accuracy.values()))
+        measured = self._measured(i, s, pose)
+        brought = None if measured is None else self._brought(i, s, measured, pose, accuracy)
+        return Row(i, time, s, measured, brought, pose, tuple(accuracy.values()))
 
     def _site(self, i: int) -> int:
         """Return the sensor of a row, or without a column of sensors, the only one."""
@@ -117,9 +129,7 @@ class Rows(ScanColumns):
         """Return a bearing or heading of a sensor at a place, as an angle of the plane."""
         return float(turned(self._value(i, quantity), self.bearings[s], self.compass, place))
 
-    def _measured(
-        self, i: int, s: int, pose: Sequence[float], accuracy: Mapping[str, float]
-    ) -> tuple[float, ...] | None:
+    def _measured(self, i: int, s: int, pose: Sequence[float]) -> tuple[float, ...] | None:
         """Return the measurement as filters take it, or None for a scan without measurements."""
         site = self.sites[s]
         quantities: tuple[str, ...] = COMPONENTS[site.kind]
@@ -130,13 +140,11 @@ class Rows(ScanColumns):
             return None
         if quantities[0] == "lon":
             place = self._agreed(i, self._plane(i, "lon", "lat"), "x", "y")
-            measured = [*place, *(self._third(i, quantity) for quantity in quantities[2:])]
-        else:
-            measured = [
-                self._angle(i, quantity, s, pose) if quantity == "bearing" else self._third(i, quantity)
-                for quantity in quantities
-            ]
-        return (*measured, *self._row_noise(i, s, measured, pose, accuracy))
+            return (*place, *(self._third(i, quantity) for quantity in quantities[2:]))
+        return tuple(
+            self._angle(i, quantity, s, pose) if quantity == "bearing" else self._third(i, quantity)
+            for quantity in quantities
+        )
 
     def _third(self, i: int, quantity: str) -> float:
         """Return a measured value, or of a third component that the row does not have, what stands in for it."""
@@ -160,27 +168,27 @@ class Rows(ScanColumns):
             raise self.table.fault(i, column, f"one of {', '.join(map(shown, features.reports))}, or an empty cell")
         return float(features.reports.index(report))
 
-    def _row_noise(
+    def _brought(
         self, i: int, s: int, measured: Sequence[float], pose: Sequence[float], accuracy: Mapping[str, float]
-    ) -> tuple[float, ...]:
-        """Return covariance and log likelihood ratios of a row in the order of `row_noise`, or () without any."""
+    ) -> Brought | None:
+        """Return covariances and log likelihood ratios of a row, or None if rows of the sensor bring none."""
         if self.accuracy[s] is None:
-            return ()
+            return None
         own, site = {name: value for name, value in accuracy.items() if not math.isnan(value)}, self.sites[s]
         names = COMPONENTS[self.sites[s].kind]
         missing = [name in GAPS and self._is_blank(i, name) for name in names]
-        stds = [own.get(f"{name}_std", 0.0) for name in names]
+        stds = [math.inf if gap else own.get(f"{name}_std", 0.0) for name, gap in zip(names, missing, strict=True)]
+        noise = np.zeros((len(names), len(names)))
+        np.fill_diagonal(noise, np.square(stds))
+        noise[0, 1] = noise[1, 0] = stds[0] * stds[1] * own.get("xy_correlation", 0.0) if len(names) > 1 else 0.0
         ratio = site.signal.log_likelihood_ratio(own["snr"]) if site.signal is not None and "snr" in own else 0.0
         classes: Sequence[float] = ()
         if site.features is not None:
             report = int(own["class"]) if "class" in own else None
             classes = site.features.log_ratios(report, own.get("size")).tolist()
         of_pose = PoseStds(**{name: own.get(f"own_{name}_std", 0.0) for name in PoseStds._fields})
-        added = pose_noise(measured, names, pose, of_pose) if any(of_pose) else None
-        correlation = own.get("xy_correlation", 0.0)
-        return row_noise(
-            stds, missing, correlation=correlation, log_likelihood_ratio=ratio, added=added, log_class_ratios=classes
-        )
+        added = pose_noise(measured, names, pose, of_pose) if any(of_pose) else np.zeros(noise.shape)
+        return Brought(noise, added, ratio, tuple(classes))
 
     def _is_blank(self, i: int, quantity: str) -> bool:
         return is_empty(self.table.columns[self._columns[quantity][0]][i])

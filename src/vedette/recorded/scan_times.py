@@ -18,7 +18,8 @@ from vedette.models import Bias
 from vedette.models.arguments import float_array
 from vedette.models.bias import NO_BIAS, with_offsets
 from vedette.models.classes import ClassFeatures
-from vedette.models.row_noise import SignalModel
+from vedette.models.scan_rows import ScanLike, values_of, with_values
+from vedette.models.signal import SignalModel
 from vedette.models.turns import is_turn
 from vedette.platforms.compass import Compass, PlaneCompass, course_deg, wrapped
 from vedette.recorded.turns import Turning
@@ -106,7 +107,7 @@ class RecordedScans(SummaryRepr):
         start: s, the recorded time of the first: since 1970 UTC if times were dates.
         is_utc: True if times were dates.
         scans: for each instant one per sensor: (num, meas_dim) measurements as filters take them, with their noise
-            (`vedette.models.with_row_noise`) if the rows have it. None: it did not scan.
+            (`vedette.models.ScanRows`) if the rows have it. None: it did not scan.
         poses: (num_instants, num_sensors, 3 or more), each sensor at its last scan, or before it at its first one.
         skipped: faults of the rows that were left out.
         bearings: for each sensor, the convention of bearings in its rows, in which a bearing's bias counts. None: it
@@ -126,7 +127,7 @@ class RecordedScans(SummaryRepr):
     times: Floats
     start: float
     is_utc: bool
-    scans: tuple[tuple[Floats | None, ...], ...]
+    scans: tuple[tuple[ScanLike | None, ...], ...]
     poses: Floats
     skipped: tuple[str, ...]
     bearings: tuple[Bearings | None, ...]
@@ -159,6 +160,10 @@ class RecordedScans(SummaryRepr):
                 if scan is not None:
                     yield SensorScan(s, time, scan, poses[s])
 
+    def measured(self, sensor: int) -> list[Floats]:
+        """Return the measurements of each scan of a sensor, (num, meas_dim)."""
+        return [values_of(scan) for scans in self.scans if (scan := scans[sensor]) is not None]
+
     @property
     def num_measurements(self) -> int:
         """Number of measurements of all scans."""
@@ -173,7 +178,7 @@ class RecordedScan(NamedTuple):
 
     time: float
     sensor: int
-    scan: Floats
+    scan: ScanLike
     pose: Floats
     accuracy: Floats | None = None
 
@@ -252,8 +257,8 @@ def remove_bias(recorded: RecordedScan, sensor: RecordedSensor, bearings: Bearin
     if sensor.bias == NO_BIAS:
         return recorded
     measured, place = sensor_bias(sensor, bearings)
-    scan, pose = with_offsets(recorded.scan, -measured, COMPONENTS[sensor.kind]), recorded.pose.copy()
+    values, pose = with_offsets(values_of(recorded.scan), -measured, COMPONENTS[sensor.kind]), recorded.pose.copy()
     pose[:2] -= place
     if is_turn(pose) and "bearing" in COMPONENTS[sensor.kind]:
         pose[BEAM] -= measured[0]
-    return recorded._replace(time=recorded.time - sensor.bias.clock, scan=scan, pose=pose)
+    return recorded._replace(time=recorded.time - sensor.bias.clock, scan=with_values(recorded.scan, values), pose=pose)

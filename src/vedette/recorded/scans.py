@@ -14,7 +14,7 @@ from vedette.internal.quantities import COMPONENTS, PLACED, is_position
 from vedette.internal.text import pluralise, shown
 from vedette.kernels.base.types import Floats
 from vedette.models.bias import NO_BIAS
-from vedette.models.row_noise import measured_part
+from vedette.models.scan_rows import ScanLike, ScanRows, values_of
 from vedette.recorded.conventions import Conventions
 from vedette.recorded.empty_scans import empty_scans
 from vedette.recorded.extents import places_of, wild
@@ -139,10 +139,8 @@ def _at_instants(rows: list[Row], how: Rows, skipped: tuple[str, ...], marked: s
 
 def _without_rows(scans: list[RecordedScan], site: RecordedSensor) -> tuple[list[RecordedScan], str]:
     """Return the scans between those with rows that have none, and a description, or nothing without a period."""
-    is_placed, dim = site.kind in PLACED, len(COMPONENTS[site.kind])
-    places = [
-        places_of(look.scan, look.pose, site.kind) if is_placed else measured_part(look.scan, dim) for look in scans
-    ]
+    is_placed = site.kind in PLACED
+    places = [places_of(look.scan, look.pose, site.kind) if is_placed else values_of(look.scan) for look in scans]
     of_rows = np.repeat(np.arange(len(scans)), [len(each) for each in places])
     found = empty_scans(np.array([look.time for look in scans]), np.concatenate(places), of_rows)
     if found is None:
@@ -183,10 +181,13 @@ def _groups(rows: list[Row], window: float) -> list[list[Row]]:
     return groups
 
 
-def _scan(rows: list[Row], site: RecordedSensor) -> Floats:
-    measured = [row.measured for row in rows if row.measured is not None]
-    length = len(measured[0]) if measured else len(COMPONENTS[site.kind])
-    return np.array(measured, np.float64).reshape(len(measured), length)
+def _scan(rows: list[Row], site: RecordedSensor) -> ScanLike:
+    own, dim = [row for row in rows if row.measured is not None], len(COMPONENTS[site.kind])
+    values = np.array([row.measured for row in own], np.float64).reshape(len(own), dim)
+    brought = [row.brought for row in own if row.brought is not None]
+    if not brought:
+        return values
+    return ScanRows(values, *(column if np.any(column) else None for column in zip(*brought, strict=True)))
 
 
 def _accuracy(rows: list[Row], columns: Sequence[str] | None) -> Floats | None:

@@ -9,6 +9,7 @@ import numpy as np
 
 from vedette.internal.quantities import COMPONENTS, is_position
 from vedette.kernels.base.types import Floats, Ints
+from vedette.models.scan_rows import ScanLike, values_of
 from vedette.models.turns import Turn, with_beam
 
 # The scans of a sensor: turns as given ("found": as found in its rows, if any), or rows with one time ("none").
@@ -26,12 +27,12 @@ _FEWEST_PLACES = 4  # fewest rows for the velocity of a sensor
 _SECTORS, _NEAR = 72, 12  # directions in which rows are counted, and how many on a side count as near
 
 
-def bearings_of(scan: Floats, poses: Floats, kind: str) -> Floats:
+def bearings_of(scan: ScanLike, poses: Floats, kind: str) -> Floats:
     """Return bearings from east, rad, of measurements from poses (num, 3 or more) or (3 or more,), empty if none."""
     if is_position(kind):
-        off = scan[:, :2] - poses[..., :2]
+        off = values_of(scan)[:, :2] - poses[..., :2]
         return np.asarray(np.arctan2(off[:, 1], off[:, 0]))
-    return scan[:, 0] if "bearing" in COMPONENTS.get(kind, ()) else np.empty(0)
+    return values_of(scan)[:, 0] if "bearing" in COMPONENTS.get(kind, ()) else np.empty(0)
 
 
 class RadarService(NamedTuple):

@@ -11,6 +11,7 @@ import numpy as np
 
 from vedette.internal.quantities import COMPONENTS, PLACED, is_position
 from vedette.kernels.base.types import Floats
+from vedette.models.scan_rows import values_of
 from vedette.recorded import RecordedScans
 from vedette.recorded.extents import places_of
 from vedette.scenarios.sections import ScenarioModel
@@ -138,14 +139,14 @@ def _clutter_limit(measurement: Measurement, recording: RecordedScans, s: int) -
     if component is None or getattr(measurement, "max_unambiguous_range_rate", None) is not None:
         return {}
     place = names.index(component)
-    values = [np.empty(0), *(scan[:, place] for scans in recording.scans if (scan := scans[s]) is not None)]
+    values = [np.empty(0), *(measured[:, place] for measured in recording.measured(s))]
     largest = float(f"{1.1 * np.abs(np.concatenate(values)).max(initial=0.0):.3g}")
     return {"max_range_rate" if component == "range_rate" else "max_height": max(1.0, largest)}
 
 
 def _rate(model: ScenarioModel, recording: RecordedScans, s: int, folder: FilePath, speed: float) -> tuple[float, str]:
     """Return the clutter rate of a sensor, per scan, and how it was estimated."""
-    counts = [len(scan) for scans in recording.scans if (scan := scans[s]) is not None]
+    counts = list(map(len, recording.measured(s)))
     if not counts:
         return 1.0, "no scan in the recording"
     share, method = target_share(_placed_scans(model, recording, s, folder), speed), _ESTIMATED
@@ -168,5 +169,5 @@ def _placed_scans(model: ScenarioModel, recording: RecordedScans, s: int, folder
         states = np.zeros((len(places), model.motion.state_dim))
         states[:, :2] = places
         detection = sensor.detection.prob(states, poses[s]) if len(places) else np.empty(0)
-        placed.append(PlacedScan(time, places, place_stds(kind, stds, scan), detection))
+        placed.append(PlacedScan(time, places, place_stds(kind, stds, values_of(scan)), detection))
     return placed

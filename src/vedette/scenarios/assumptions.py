@@ -44,10 +44,7 @@ def assumed_sections(
         _check_period(period, assumed.get("region") or model.region.model_dump(), speed)
     assumed |= assumed_motion(given, speed, descriptions)
     if "birth" not in given:
-        measured = [
-            [scan for scans in recording.scans if (scan := scans[s]) is not None and len(scan)]
-            for s in range(len(model.sensors))
-        ]
+        measured = [[own for own in recording.measured(s) if len(own)] for s in range(len(model.sensors))]
         assumed |= assumed_birth(model, measured, folder, speed, descriptions, learnt=has_intensity(model))
     if turns := _turns(model, recording):
         descriptions["turn"] = turns

@@ -92,7 +92,7 @@ def _large_scan_window(model: ScenarioModel, recording: RecordedScans) -> Iterat
 def _noise_beyond_ranges(model: ScenarioModel, recording: RecordedScans) -> Iterator[tuple[Path, str]]:
     """Yield warnings of noise of a range that is larger than the range itself, at the median of its measurements."""
     for s, sensor in enumerate(model.sensors):
-        scans = [scan for instant in recording.scans if (scan := instant[s]) is not None and len(scan)]
+        scans = [measured for measured in recording.measured(s) if len(measured)]
         names, stds = COMPONENTS.get(sensor.measurement.kind, ()), noise_stds(sensor)
         if "range" not in names or stds is None or not scans:
             continue

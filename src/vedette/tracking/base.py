@@ -20,6 +20,7 @@ from vedette.internal.text import pluralise
 from vedette.kernels.base.types import Floats
 from vedette.models import SensorModel, TargetModel
 from vedette.models.arguments import float_array, one_a_sensor, real, reject
+from vedette.models.scan_rows import table_of
 
 # s. Without a period of births, the length of the first prediction has no effect, as there are no targets before.
 _FIRST_PERIOD = 1.0
@@ -209,7 +210,7 @@ def failed_stage(error: BaseException) -> str | None:
 
 def scan_bytes(scan: Any, pose: Any) -> int:
     """Return the bytes of the measurements and of the sensor's pose, or 0 without a scan."""
-    return 0 if scan is None else NUMBER_BYTES * (np.size(scan) + len(pose))
+    return 0 if scan is None else NUMBER_BYTES * (np.size(table_of(scan)) + len(pose))
 
 
 def belief_bytes(belief: Any) -> int:

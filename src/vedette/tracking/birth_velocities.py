@@ -15,7 +15,7 @@ from vedette.models import SensorModel
 from vedette.models.arguments import pose_vector
 from vedette.models.functions import write_rows
 from vedette.models.measurement import wrap_periodic
-from vedette.models.row_noise import measured_part, noise_of_rows
+from vedette.models.scan_rows import ScanLike, as_scan, noise_of_rows, values_of
 from vedette.models.turns import is_turn, lags
 
 
@@ -33,7 +33,7 @@ def with_velocities(births: LMB, std: Floats, sensors: Sequence[SensorModel], sc
         sensors, scans, poses: one per sensor. A scan is None if the sensor did not scan.
     """
     informative = [
-        (sensor, np.ascontiguousarray(scan, np.float64), pose_vector("pose", pose))
+        (sensor, as_scan(scan), pose_vector("pose", pose))
         for sensor, scan, pose in zip(sensors, scans, poses, strict=True)
         if sensor.meas_dim > 2 and sensor.measurement.jacobian is not None and scan is not None and len(scan)
     ]
@@ -75,10 +75,11 @@ def at_scan_time(births: LMB, poses: Sequence[Floats]) -> LMB:
     return LMB.from_kernel(lmb._replace(tracks=lmb.tracks._replace(components=moved)))
 
 
-def _condition(means: Floats, covs: Floats, std: Floats, sensor: SensorModel, scan: Floats, pose: Floats) -> None:
+def _condition(means: Floats, covs: Floats, std: Floats, sensor: SensorModel, scan: ScanLike, pose: Floats) -> None:
     """Update means (num, state_dim) and covariances (num, state_dim, state_dim) by a scan, in place."""
     model = sensor.measurement
-    states_at_rest = model.states_at(scan, pose, len(std))
+    measured = values_of(scan)
+    states_at_rest = model.states_at(measured, pose, len(std))
     slopes = np.empty((len(scan), sensor.meas_dim, len(std)))
     assert model.jacobian is not None
     write_rows(model.jacobian, states_at_rest, pose, model.params, slopes)
@@ -91,7 +92,7 @@ def _condition(means: Floats, covs: Floats, std: Floats, sensor: SensorModel, sc
     matched = nearest[births]
     covs_of_noise = noise_of_rows(scan, sensor.noise.covs(states_at_rest, pose, sensor.meas_dim))
     slope, noise = slopes[matched][:, rows, 2:4], covs_of_noise[matched][:, rows][:, :, rows]
-    off = measured_part(scan, sensor.meas_dim) - model.measure(states_at_rest, pose)
+    off = measured - model.measure(states_at_rest, pose)
     prior, periods = covs[births, 2:4, 2:4], model.periods[rows]
     residual = wrap_periodic(off[matched][:, rows] - (slope @ means[births, 2:4, np.newaxis])[..., 0], periods)
     spread = slope @ prior @ slope.swapaxes(1, 2)

@@ -25,6 +25,7 @@ from vedette.kernels.labelled.births import BirthsOfMeasurements, births_of_meas
 from vedette.kernels.steps.association_probability import births_unexplained, prob_explained
 from vedette.models import BirthModel, MeasurementBirth, SensorModel
 from vedette.models.arguments import pose_vector, reject
+from vedette.models.scan_rows import as_scan, to_measurements
 from vedette.tracking.birth_velocities import at_scan_time, with_velocities
 
 # A measurement unexplained with at most this probability makes no birth: each birth costs a track until the next scan.
@@ -181,9 +182,7 @@ def _as_kernel(belief: LabelledDensity) -> Lmb:
 
 def _scan_input(belief: Lmb, sensor: SensorModel, scan: Any, pose: Floats) -> ScanInput:
     """Return a scan, already checked by the filters, as input of kernels."""
-    measurements = np.ascontiguousarray(scan, np.float64)
-    if not len(measurements):
-        measurements = np.empty((0, sensor.meas_dim))
+    measurements = to_measurements(as_scan(scan if len(scan) else np.empty((0, sensor.meas_dim))))
     return ScanInput(no_births_for_kernel(belief.tracks.components.means.shape[1]), measurements, pose, 0.0)
 
 
@@ -195,7 +194,7 @@ def _unexplained_by_sensor(
         explained = prob_explained(belief, scan_input, sensor.to_kernel(), _truncation(sensor.meas_dim))
     indices = np.flatnonzero(explained < 1.0 - MIN_UNEXPLAINED)
     states = sensor.measurement.states_at(
-        scan_input.measurements[indices], scan_input.pose, belief.tracks.components.means.shape[1]
+        scan_input.measurements.values[indices], scan_input.pose, belief.tracks.components.means.shape[1]
     )
     return UnexplainedMeasurements(states, 1.0 - explained[indices], np.full(len(indices), number))
 
@@ -206,7 +205,7 @@ def _births_of_single_sensor(
     """Return the birth candidates from the scan of a single sensor."""
     lmb = _as_kernel(belief)
     scan_input = _scan_input(lmb, sensor, scan, pose)
-    states = sensor.measurement.states_at(scan_input.measurements, scan_input.pose, len(parameters.std))
+    states = sensor.measurement.states_at(scan_input.measurements.values, scan_input.pose, len(parameters.std))
     models = sensor.to_kernel(), _truncation(sensor.meas_dim)
     with model_errors():
         return LMB.from_kernel(births_unexplained(lmb, scan_input, states, *models, MIN_UNEXPLAINED, parameters))

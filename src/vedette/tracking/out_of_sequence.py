@@ -16,6 +16,7 @@ from vedette.internal.representation import SummaryRepr, TabularRepr
 from vedette.internal.text import pluralise
 from vedette.kernels.base.types import Floats
 from vedette.models.arguments import as_array, count, dimension, instance, pose_vector, positive, real, reject
+from vedette.models.scan_rows import ScanLike, ScanRows, table_of
 from vedette.tracking.base import State, Tracker, TrackerInfo
 
 _TIME = attrgetter("time")
@@ -300,8 +301,10 @@ def copy_scan(scan: SensorScan, num_sensors: int) -> SensorScan:
         raise reject("scan.sensor", f"a whole number from 0 to {num_sensors - 1}", scan.sensor)
     real("scan.time", scan.time)
     pose = pose_vector(f"{scan_name(scan)}, pose", scan.pose)
-    measured = as_array(f"{scan_name(scan)}: scan", scan.measurements, "fiu", "numbers in an array")
-    return SensorScan(int(scan.sensor), float(scan.time), np.array(measured, float), pose.copy())
+    measured = scan.measurements
+    if not isinstance(measured, ScanRows):
+        measured = np.array(as_array(f"{scan_name(scan)}: scan", measured, "fiu", "numbers in an array"), float)
+    return SensorScan(int(scan.sensor), float(scan.time), measured, pose.copy())
 
 
 def scan_name(scan: SensorScan) -> str:
@@ -330,8 +333,7 @@ def _check_equal(first: SensorScan, second: SensorScan) -> None:
         raise InputError(f"{place}: expected one scan of a sensor at a time; got a second one that differs")
 
 
-def _sorted_rows(measurements: Floats) -> Floats:
-    """Return the rows sorted by their first number, then the second, and so on."""
-    return (
-        measurements[np.lexsort(measurements.T[::-1])] if measurements.ndim == 2 and measurements.size else measurements
-    )
+def _sorted_rows(measurements: ScanLike) -> Floats:
+    """Return the rows, with all that they bring, sorted by their first number, then the second, and so on."""
+    table = table_of(measurements)
+    return table[np.lexsort(table.T[::-1])] if table.ndim == 2 and table.size else table

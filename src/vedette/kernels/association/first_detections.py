@@ -97,12 +97,13 @@ def missed_intensity(seen: Rows, scan: ScanInput, sensor: Sensor, num: int, left
 
 
 @kernel
-def _gated_pairs(seen: Rows, num_local: int, scan: Floats, log_clutter: Floats, sight: Sight, gate: float) -> _Pairs:
-    near = near_measurements(seen, scan, sight.sensor.periods, gate)
+def _gated_pairs(seen: Rows, num_local: int, sight: Sight, gate: float) -> _Pairs:
+    measurements = sight.measurements
+    near = near_measurements(seen, measurements, sight.sensor.periods, gate)
     num, num_rows = near.offsets[len(near.offsets) - 1], len(seen.log_absent)
-    meas_dim = len(sight.sensor.periods)
-    marks = room_for_updated_marks(scan, meas_dim, num)
-    options = make_room(0, num, num, len(scan), meas_dim, room_for_updated(seen, num), marks)
+    num_measurements, meas_dim = measurements.values.shape
+    marks = room_for_updated_marks(measurements, num)
+    options = make_room(0, num, num, num_measurements, meas_dim, room_for_updated(seen, num), marks)
     components, filled = np.empty(num, np.int64), 0
     for c in range(num_rows):
         own = c - (num_rows - num_local)
@@ -110,7 +111,7 @@ def _gated_pairs(seen: Rows, num_local: int, scan: Floats, log_clutter: Floats, 
             j = near.measurements[at]
             if own >= 0 and j != own:
                 continue
-            weight = weigh_detection(seen, c, scan[j], log_clutter[j], sight, gate, filled, options)
+            weight = weigh_detection(seen, c, j, sight, gate, filled, options)
             if weight > -math.inf:
                 components[filled], options.columns[filled], options.log_weights[filled] = c, j, weight
                 filled += 1
@@ -183,15 +184,16 @@ def candidates_of(
         least_logit: log of the least odds of a candidate.
         label: birth step and index of the candidate of the first measurement.
     """
-    sight = Sight(sensor, scan.pose, make_pair_work(seen.components.means.shape[1], len(sensor.periods)))
-    pairs = _gated_pairs(seen, num_local, scan.measurements, log_clutter, sight, gate)
+    work = make_pair_work(seen.components.means.shape[1], len(sensor.periods))
+    sight = Sight(sensor, scan.pose, scan.measurements, log_clutter, work)
+    pairs = _gated_pairs(seen, num_local, sight, gate)
     left_out = np.zeros(len(seen.log_absent))
     chosen, log_left_out = _chosen(pairs, unclaimed, least_logit, left_out)
     num, meas_dim = len(chosen.measurements), len(sensor.periods)
     rows = make_rows(num, chosen.num_pairs, seen.components, meas_dim)
     updated = room_for_updated(seen, chosen.num_pairs)
-    marks = room_for_updated_marks(scan.measurements, meas_dim, chosen.num_pairs)
-    options = make_room(num, 2 * num, chosen.num_pairs, len(scan.measurements), meas_dim, updated, marks)
+    marks = room_for_updated_marks(scan.measurements, chosen.num_pairs)
+    options = make_room(num, 2 * num, chosen.num_pairs, len(unclaimed), meas_dim, updated, marks)
     for row in range(num):
         j = chosen.measurements[row]
         rows.labels[row, 0], rows.labels[row, 1] = label[0], label[1] + j

@@ -16,9 +16,8 @@ import numpy as np
 from vedette.kernels.association.predicted import Rows
 from vedette.kernels.base.arrays import grown_ints
 from vedette.kernels.base.compile import borrowing, inlined, kernel
-from vedette.kernels.base.types import Floats, Ints
+from vedette.kernels.base.types import Floats, Ints, Measurements
 from vedette.kernels.gaussian.mixtures import descending_order
-from vedette.kernels.gaussian.row_noise import place_of_variance
 from vedette.kernels.gaussian.scratch import wrap
 
 # Margin of the ends of gates for rounding of distances.
@@ -39,25 +38,28 @@ def all_measurements() -> Near:
 
 
 @kernel
-def _largest_variances(scan: Floats, dim: int) -> Floats:
+def _largest_variances(measurements: Measurements) -> Floats:
     """Return the largest variance of each component of the noise that measurements bring, shape (meas_dim,)."""
-    out = np.zeros(dim)
-    if scan.shape[1] > dim:
-        for a in range(dim):
-            for j in range(len(scan)):
-                out[a] = max(out[a], abs(scan[j, place_of_variance(a, dim)]))
+    out = np.zeros(measurements.values.shape[1])
+    for a in range(len(out)):
+        own, added = 0.0, 0.0
+        for j in range(len(measurements.noise)):
+            own = max(own, measurements.noise[j, a, a])
+        for j in range(len(measurements.added_noise)):
+            added = max(added, measurements.added_noise[j, a, a])
+        out[a] = own + added
     return out
 
 
 @kernel
-def _gate_reaches(rows: Rows, scan: Floats, gate: float) -> Floats:
+def _gate_reaches(rows: Rows, measurements: Measurements, gate: float) -> Floats:
     """Half-width of the gate of each component along each axis, shape (num_components, meas_dim).
 
     With the noise of the model and the largest that a measurement brings.
     """
     factor = rows.innovation.factor
     num, dim = rows.innovation.predicted.shape
-    out, own = np.empty((num, dim)), _largest_variances(scan, dim)
+    out, own = np.empty((num, dim)), _largest_variances(measurements)
     for c in range(num):
         for a in range(dim):
             variance = own[a]
@@ -145,10 +147,11 @@ def _increasing(scan: Floats, axis: int) -> tuple[Ints, Floats]:
 
 
 @kernel
-def near_measurements(rows: Rows, scan: Floats, periods: Floats, gate: float) -> Near:
+def near_measurements(rows: Rows, measurements: Measurements, periods: Floats, gate: float) -> Near:
     """Return the measurements that may be in the gates of each row: all that are, and few others."""
+    scan = measurements.values
     num, num_rows = len(scan), len(rows.log_absent)
-    reaches = _gate_reaches(rows, scan, gate)
+    reaches = _gate_reaches(rows, measurements, gate)
     axis = _finest_axis(scan, reaches)
     order, values = _increasing(scan, axis)
     offsets, found, filled = np.zeros(num_rows + 1, np.int64), np.empty(4 * num_rows + num, np.int64), 0

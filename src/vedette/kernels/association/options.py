@@ -16,19 +16,21 @@ from vedette.kernels.association.gating import Near, near_measurements
 from vedette.kernels.association.predicted import Rows, log_or_minus_inf
 from vedette.kernels.association.truncation import Truncation
 from vedette.kernels.base.compile import borrowing, inlined, kernel
-from vedette.kernels.base.types import Floats, Ints, Marks, ScanInput, Sensor
+from vedette.kernels.base.types import Floats, Ints, Marks, Measurements, ScanInput, Sensor
 from vedette.kernels.gaussian.detection import detection_probability, moments_if_missed
 from vedette.kernels.gaussian.innovation import copy_innovation, whiten, write_posterior
 from vedette.kernels.gaussian.marks import no_marks, room_for_updated_marks, update_marks
 from vedette.kernels.gaussian.relinearisation import Pair, PairWork, make_pair_work, update_pair
-from vedette.kernels.gaussian.row_noise import has_own_noise, log_likelihood_ratio
+from vedette.kernels.gaussian.row_noise import bring_noise, log_likelihood_ratio, mark_missing, noise_of_row
 
 
 class Sight(NamedTuple):
-    """The sensor of a scan and its pose, and working arrays for updates of components that bend."""
+    """A scan with its sensor, pose and clutter, and working arrays for updates of components that bend."""
 
     sensor: Sensor
     pose: Floats  # (pose_dim,)
+    measurements: Measurements
+    log_clutter: Floats  # (>= num_measurements,) log clutter intensity at each measurement
     work: PairWork
 
 
@@ -59,14 +61,15 @@ def make_room(
 
 
 @kernel
-def _room_for(rows: Rows, near: Near, scan: Floats, meas_dim: int) -> Options:
+def _room_for(rows: Rows, near: Near, measurements: Measurements) -> Options:
     """Return arrays for the options of rows with the measurements near them."""
     num, most_entries = len(rows.log_absent), 0
     for row in range(num):
         most_entries += (rows.offsets[row + 1] - rows.offsets[row]) * (near.offsets[row + 1] - near.offsets[row] + 1)
     updated = room_for_updated(rows, most_entries)
-    marks = room_for_updated_marks(scan, meas_dim, most_entries)
-    return make_room(num, near.offsets[num] + 2 * num, most_entries, len(scan), meas_dim, updated, marks)
+    marks = room_for_updated_marks(measurements, most_entries)
+    num_measurements, meas_dim = measurements.values.shape
+    return make_room(num, near.offsets[num] + 2 * num, most_entries, num_measurements, meas_dim, updated, marks)
 
 
 @kernel
@@ -88,25 +91,38 @@ def view_options(options: Options, num_rows: int, num_measurements: int) -> Opti
 
 @inlined
 def log_clutter_at(sensor: Sensor, measurement: Floats, pose: Floats) -> float:
-    """Return the log clutter intensity at a measurement, over the likelihood ratio of its features.
-
-    -inf if clutter is impossible there.
-    """
+    """Return the log clutter intensity at a measurement, -inf if clutter is impossible there."""
     level = sensor.log_clutter_intensity(measurement, pose, sensor.clutter_params)
     if math.isnan(level) or level == math.inf:
         raise ModelError("clutter model: log intensity is not a number below infinity")
-    return float(level - log_likelihood_ratio(measurement, len(sensor.periods)))
+    return float(level)
+
+
+@inlined
+def log_clutter_of_row(sensor: Sensor, measurements: Measurements, j: int, pose: Floats, values: Floats) -> float:
+    """Return the log clutter intensity at measurement `j`, over the likelihood ratio of its features.
+
+    values: (meas_dim,) overwritten if the row brings noise.
+    """
+    if len(measurements.noise) == 0:
+        level = log_clutter_at(sensor, measurements.values[j], pose)
+    else:
+        mark_missing(measurements, j, values)
+        level = log_clutter_at(sensor, values, pose)
+    return level - log_likelihood_ratio(measurements, j)
 
 
 @borrowing
-def _log_clutter(sensor: Sensor, scan: Floats, pose: Floats, floor: float, out: Floats) -> tuple[float, int]:
+def _log_clutter(
+    sensor: Sensor, measurements: Measurements, pose: Floats, floor: float, values: Floats, out: Floats
+) -> tuple[float, int]:
     """Write the log clutter intensity at each measurement, raised to `floor`.
 
     Return their sum and the number raised.
     """
     total, num_raised = 0.0, 0
-    for j in range(len(scan)):
-        level = log_clutter_at(sensor, scan[j], pose)
+    for j in range(len(measurements.values)):
+        level = log_clutter_of_row(sensor, measurements, j, pose, values)
         # With zero clutter intensity, no hypothesis could leave the measurement unexplained.
         if level < floor:
             level = floor
@@ -133,27 +149,26 @@ def sort_row(start: int, stop: int, columns: Ints, log_weights: Floats, entries:
 
 
 @inlined
-def weigh_detection(
-    rows: Rows, c: int, measurement: Floats, log_clutter: float, sight: Sight, gate: float, entry: int, out: Options
-) -> float:
-    """Return the log weight of component `c` detected as a measurement, relative to clutter, or -inf outside the gate.
+def weigh_detection(rows: Rows, c: int, j: int, sight: Sight, gate: float, entry: int, out: Options) -> float:
+    """Return the log weight of component `c` detected as measurement `j` over clutter, -inf outside the gate.
 
     Writes its whitened residual, its updated moments if it bends, and its updated marks, at `entry`.
     """
-    innovation = rows.innovation
-    distance, log_norm = 0.0, innovation.log_norm[c]
-    if not has_own_noise(measurement, innovation.predicted.shape[1]):
+    innovation, measurements = rows.innovation, sight.measurements
+    measurement, distance, log_norm = measurements.values[j], 0.0, innovation.log_norm[c]
+    if not bring_noise(measurements):
         distance = whiten(innovation, c, measurement, sight.sensor.periods, gate, out.whitened[entry])
     if innovation.bends[c] and distance <= gate:
         copy_innovation(innovation, c, sight.work.innovation, 0)
-        pair = Pair(sight.pose, rows.components.means[c], rows.components.covs[c], measurement)
+        own = noise_of_row(measurements, j)
+        pair = Pair(sight.pose, rows.components.means[c], rows.components.covs[c], measurement, own)
         distance = update_pair(sight.sensor, pair, gate, sight.work, out.updated[entry])
         log_norm = sight.work.innovation.log_norm[0]
     if not distance <= gate:
         return -math.inf
     # The predicted component times p_D g(z | x) / kappa(z), integrated over x.
-    weight = rows.components.log_weights[c] + log_norm - 0.5 * distance - log_clutter
-    weight += update_marks(rows.components.marks, c, measurement, innovation.predicted.shape[1], out.marks, entry)
+    weight = rows.components.log_weights[c] + log_norm - 0.5 * distance - sight.log_clutter[j]
+    weight += update_marks(rows.components.marks, c, measurements, j, out.marks, entry)
     detected = innovation.prob_detection[c]
     if innovation.at_edge[c]:
         detected = _detected_there(rows, c, sight, out.whitened[entry], out.updated[entry])
@@ -169,17 +184,15 @@ def _detected_there(rows: Rows, c: int, sight: Sight, whitened: Floats, updated:
 
 
 @inlined
-def _detection_option(
-    rows: Rows, row: int, measurement: Floats, log_clutter: float, sight: Sight, gate: float, entry: int, out: Options
-) -> float:
-    """Write the component entries of row `row` detected as a measurement.
+def _detection_option(rows: Rows, row: int, j: int, sight: Sight, gate: float, entry: int, out: Options) -> float:
+    """Write the component entries of row `row` detected as measurement `j`.
 
     Return its log weight, -inf outside the gate.
     """
     peak, first = -math.inf, rows.offsets[row]
     count = rows.offsets[row + 1] - first
     for i in range(count):
-        weight = weigh_detection(rows, first + i, measurement, log_clutter, sight, gate, entry + i, out)
+        weight = weigh_detection(rows, first + i, j, sight, gate, entry + i, out)
         peak = max(peak, weight)
         out.component_log_weights[entry + i] = weight
     return _total_from_peak(out.component_log_weights, entry, count, peak)
@@ -196,9 +209,7 @@ def _total_from_peak(values: Floats, start: int, count: int, peak: float) -> flo
 
 
 @borrowing
-def _fill_options(
-    rows: Rows, near: Near, scan: Floats, log_clutter: Floats, sight: Sight, gate: float, out: Options
-) -> None:
+def _fill_options(rows: Rows, near: Near, sight: Sight, gate: float, out: Options) -> None:
     """Write the options of every row, heaviest first. Options of weight zero are left out."""
     filled, entry, every = 0, 0, len(near.offsets) == 0
     out.offsets[0] = 0
@@ -224,10 +235,10 @@ def _fill_options(
             out.columns[filled], out.log_weights[filled], out.entries[filled] = MISSED, total, entry
             filled += 1
             entry += count
-        begin, end = (0, len(scan)) if every else (near.offsets[row], near.offsets[row + 1])
+        begin, end = (0, len(sight.measurements.values)) if every else (near.offsets[row], near.offsets[row + 1])
         for at in range(begin, end):
             j = at if every else near.measurements[at]
-            weight = _detection_option(rows, row, scan[j], log_clutter[j], sight, gate, entry, out)
+            weight = _detection_option(rows, row, j, sight, gate, entry, out)
             # Outside the gate nothing is kept: the next option overwrites the entries.
             if weight > -math.inf:
                 out.columns[filled], out.log_weights[filled], out.entries[filled] = j, weight, entry
@@ -255,15 +266,16 @@ def weigh_options(
     each measurement. work: for updates of components that bend. Returns the sum of the log clutter intensities, and how
     many of them were raised to the floor.
     """
-    total, num_raised = _log_clutter(sensor, scan.measurements, scan.pose, caps.log_clutter_floor, log_clutter)
-    _fill_options(rows, near, scan.measurements, log_clutter, Sight(sensor, scan.pose, work), caps.gate, out)
+    floor, values = caps.log_clutter_floor, work.scratch.residual
+    total, num_raised = _log_clutter(sensor, scan.measurements, scan.pose, floor, values, log_clutter)
+    _fill_options(rows, near, Sight(sensor, scan.pose, scan.measurements, log_clutter, work), caps.gate, out)
     return total, num_raised
 
 
 @kernel
 def weighed_options(rows: Rows, scan: ScanInput, sensor: Sensor, caps: Truncation) -> tuple[Options, float, int]:
     """Return the result of `weigh_options` in new arrays."""
-    return weighed_options_at(rows, scan, sensor, caps, np.empty(len(scan.measurements)))
+    return weighed_options_at(rows, scan, sensor, caps, np.empty(len(scan.measurements.values)))
 
 
 @kernel
@@ -272,7 +284,7 @@ def weighed_options_at(
 ) -> tuple[Options, float, int]:
     """Return the result of `weighed_options`. log_clutter: (num_measurements,) written as in `weigh_options`."""
     near = near_measurements(rows, scan.measurements, sensor.periods, caps.gate)
-    options = _room_for(rows, near, scan.measurements, len(sensor.periods))
+    options = _room_for(rows, near, scan.measurements)
     work = make_pair_work(rows.components.means.shape[1], len(sensor.periods))
     log_total, num_raised = weigh_options(rows, near, scan, sensor, caps, log_clutter, work, options)
     return options, log_total, num_raised

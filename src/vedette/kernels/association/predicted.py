@@ -18,6 +18,7 @@ from vedette.kernels.gaussian.components import borrowed_components, components_
 from vedette.kernels.gaussian.innovation import Innovation, expect, make_innovation
 from vedette.kernels.gaussian.linalg import log_add
 from vedette.kernels.gaussian.prediction import predict
+from vedette.kernels.gaussian.row_noise import bring_noise
 from vedette.kernels.gaussian.scratch import Scratch, make_scratch
 
 
@@ -96,11 +97,11 @@ def fill_births(birth: Lmb, first_row: int, rows: Rows) -> None:
 
 @borrowing
 def expect_rows(sensor: Sensor, scan: ScanInput, rows: Rows, scratch: Scratch) -> None:
-    """Write the expected measurement of every component of the rows for a scan. Its measurements are not used.
+    """Write the expected measurement of every component of the rows for a scan. Its values are not used.
 
-    If these bring noise of their own, each has an update of its own, as for a component over which the sensor bends.
+    If its rows bring noise of their own, each has an update of its own, as for a component over which the sensor bends.
     """
-    components, by_pair = rows.components, scan.measurements.shape[1] > len(sensor.periods)
+    components, by_pair = rows.components, bring_noise(scan.measurements)
     for c in range(len(components.log_weights)):
         expect(sensor, scan.pose, components.means[c], components.covs[c], c, rows.innovation, scratch)
         rows.innovation.bends[c] = rows.innovation.bends[c] or by_pair

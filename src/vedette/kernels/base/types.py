@@ -106,10 +106,27 @@ class Sensor(NamedTuple):
     detection_nodes: Floats  # (num, 3) weight and two standard deviates per node; empty for AT_CENTRE
 
 
+class Measurements(NamedTuple):
+    """The rows of a scan and what they bring with them. Fields that no row brings are empty."""
+
+    values: Floats  # (num, meas_dim), finite
+    noise: Floats  # (num, meas_dim, meas_dim) covariance; variance 0: that of the noise model, inf: not measured
+    added_noise: Floats  # (num, meas_dim, meas_dim) covariance in addition to it, or to that of the noise model
+    log_ratios: Floats  # (num,) log likelihood ratio of a row's features, target over clutter
+    class_ratios: Floats  # (num, num_classes) the same of further features, log, for targets of each class
+
+
+class RowNoise(NamedTuple):
+    """The noise that one row brings. Fields are empty as in `Measurements`."""
+
+    own: Floats  # (1, meas_dim, meas_dim)
+    added: Floats  # (1, meas_dim, meas_dim)
+
+
 class ScanInput(NamedTuple):
     """One scan of a sensor, and the births since the previous scan."""
 
     birth: Lmb  # births since the previous scan
-    measurements: Floats  # (num_measurements, meas_dim)
+    measurements: Measurements
     pose: Floats  # (pose_dim,) of the sensor
     dt: float  # seconds since the previous scan

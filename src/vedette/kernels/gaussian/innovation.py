@@ -9,12 +9,12 @@ import numpy as np
 
 from vedette.errors import ModelError
 from vedette.kernels.base.compile import borrowing, inlined, kernel
-from vedette.kernels.base.types import HEIGHT, Bools, Floats, Sensor
+from vedette.kernels.base.types import HEIGHT, Bools, Floats, RowNoise, Sensor
 from vedette.kernels.gaussian.beam import own_height
 from vedette.kernels.gaussian.detection import detection_and_edge
 from vedette.kernels.gaussian.joseph import posterior_of_squares
 from vedette.kernels.gaussian.linalg import LOG_2PI, cholesky_of_size, log_det_from_factor
-from vedette.kernels.gaussian.row_noise import MISSING, replace_noise
+from vedette.kernels.gaussian.row_noise import MISSING, no_row_noise, replace_noise
 from vedette.kernels.gaussian.scratch import Scratch, is_folded, wrap
 from vedette.kernels.gaussian.sigma_points import (
     LINEARISED,
@@ -272,7 +272,7 @@ def log_norm_of_factor(factor: Floats) -> float:
 @inlined
 def expect(sensor: Sensor, pose: Floats, mean: Floats, cov: Floats, at: int, out: Innovation, scratch: Scratch) -> None:
     """Fill entry `at` of `out`. Noise is taken at the predicted mean (paper-notes 3), detection as the sensor says."""
-    expect_measurement(sensor, pose, mean, cov, out.predicted[at], at, out, scratch)
+    expect_measurement(sensor, pose, mean, cov, no_row_noise(out.factor), at, out, scratch)
     out.prob_detection[at], out.at_edge[at] = detection_and_edge(sensor, pose, mean, cov, scratch.points[0])
 
 
@@ -282,21 +282,21 @@ def expect_measurement(
     pose: Floats,
     mean: Floats,
     cov: Floats,
-    measurement: Floats,
+    own: RowNoise,
     at: int,
     out: Innovation,
     scratch: Scratch,
 ) -> None:
     """Fill entry `at` of `out` except the detection probability, see `expect`.
 
-    measurement: its noise is used if it brings one (`row_noise`), else the model's, as for `out.predicted[at]`.
+    own: noise that the measurement brings. The noise model has the rest.
     """
     n, m = mean.shape[0], out.predicted.shape[1]
     jacobian, noise, innovation = scratch.measurement_jacobian, scratch.measurement_noise, scratch.innovation_cov
     factor, cross, posterior = out.factor[at], out.whitened_cross[at], out.covs[at]
     linearised, log_uniform = sensor.method == LINEARISED or sensor.method == SWITCHED, 0.0
     sensor.measurement_noise_cov(mean, pose, sensor.noise_params, noise)
-    replace_noise(measurement, noise)
+    replace_noise(own, noise)
     if linearised:
         sensor.measurement(mean, pose, sensor.measurement_params, out.predicted[at])
         sensor.measurement_jacobian(mean, pose, sensor.measurement_params, jacobian)

@@ -15,9 +15,8 @@ from collections.abc import Iterable
 import numpy as np
 
 from vedette.kernels.base.compile import borrowing, inlined, kernel
-from vedette.kernels.base.types import Floats, Ints, Marks
+from vedette.kernels.base.types import Floats, Ints, Marks, Measurements
 from vedette.kernels.gaussian.linalg import normalise_logs
-from vedette.kernels.gaussian.row_noise import num_class_ratios, row_length
 
 
 @kernel
@@ -27,9 +26,9 @@ def marks_like(marks: Marks, num: int) -> Marks:
 
 
 @kernel
-def room_for_updated_marks(scan: Floats, meas_dim: int, num: int) -> Marks:
-    """Room for this number of components, with the columns that measurements of the scan change."""
-    return Marks(np.empty((num, num_class_ratios(scan.shape[1], meas_dim))))
+def room_for_updated_marks(measurements: Measurements, num: int) -> Marks:
+    """Room for this number of components, with the columns that measurements change."""
+    return Marks(np.empty((num, measurements.class_ratios.shape[1])))
 
 
 @kernel
@@ -89,13 +88,12 @@ def pool_marks(marks: Marks, chosen: Ints, powers: Floats, count: int, out: Mark
 
 
 @inlined
-def update_marks(marks: Marks, c: int, measurement: Floats, meas_dim: int, out: Marks, target: int) -> float:
-    """Write the marks of component `c` after a measurement, and return the log of the factor of its weight."""
+def update_marks(marks: Marks, c: int, measurements: Measurements, j: int, out: Marks, target: int) -> float:
+    """Write the marks of component `c` after measurement `j`, and return the log of the factor of its weight."""
     if out.log_class_probs.shape[1] == 0:
         return 0.0
-    first = row_length(meas_dim)
     for k in range(out.log_class_probs.shape[1]):
-        out.log_class_probs[target, k] = marks.log_class_probs[c, k] + measurement[first + k]
+        out.log_class_probs[target, k] = marks.log_class_probs[c, k] + measurements.class_ratios[j, k]
     return _normalise_classes(out.log_class_probs[target])
 
 

@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 from vedette.errors import NumericalError
 from vedette.kernels.base.compile import borrowing, inlined, kernel
-from vedette.kernels.base.types import Floats, Sensor
+from vedette.kernels.base.types import Floats, RowNoise, Sensor
 from vedette.kernels.gaussian.innovation import (
     Innovation,
     bends_over,
@@ -27,7 +27,7 @@ from vedette.kernels.gaussian.innovation import (
     write_posterior,
 )
 from vedette.kernels.gaussian.linalg import cholesky, solve_lower, solve_upper
-from vedette.kernels.gaussian.row_noise import has_own_noise, replace_noise
+from vedette.kernels.gaussian.row_noise import replace_noise
 from vedette.kernels.gaussian.scratch import Scratch, make_scratch, wrap
 from vedette.kernels.gaussian.sigma_points import (
     SWITCHED,
@@ -49,7 +49,8 @@ class Pair(NamedTuple):
     pose: Floats  # (pose_dim,)
     mean: Floats  # (state_dim,)
     cov: Floats  # (state_dim, state_dim)
-    measurement: Floats  # (meas_dim,), or with the noise of the row, see `row_noise`
+    measurement: Floats  # (meas_dim,)
+    noise: RowNoise  # that the measurement brings
 
 
 class PairWork(NamedTuple):
@@ -187,7 +188,7 @@ def _regress(sensor: Sensor, pair: Pair, work: PairWork) -> None:
 @borrowing
 def _expect_and_whiten(sensor: Sensor, pair: Pair, work: PairWork) -> float:
     """Fill the innovation of the Gaussian (noise of the pair). Returns the squared distance of the measurement."""
-    expect_measurement(sensor, pair.pose, pair.mean, pair.cov, pair.measurement, 0, work.innovation, work.scratch)
+    expect_measurement(sensor, pair.pose, pair.mean, pair.cov, pair.noise, 0, work.innovation, work.scratch)
     return whiten(work.innovation, 0, pair.measurement, sensor.periods, math.inf, work.scratch.residual)
 
 
@@ -202,7 +203,7 @@ def relinearise(sensor: Sensor, pair: Pair, work: PairWork) -> float:
     whiten(innovation, 0, pair.measurement, sensor.periods, math.inf, scratch.residual)
     update_mean(innovation, 0, scratch.residual, pair.mean, scratch.points[0])
     sensor.measurement_noise_cov(pair.mean, pair.pose, sensor.noise_params, scratch.measurement_noise)
-    replace_noise(pair.measurement, scratch.measurement_noise)
+    replace_noise(pair.noise, scratch.measurement_noise)
     sensor.measurement_jacobian(pair.mean, pair.pose, sensor.measurement_params, scratch.measurement_jacobian)
     log_uniform = ignore_ambiguous(sensor, scratch.measurement_jacobian, pair.cov, scratch.measurement_noise)
     if not cholesky(pair.cov, scratch.factor):
@@ -254,7 +255,7 @@ def update_pair(sensor: Sensor, pair: Pair, gate: float, work: PairWork, out: Fl
     the squared distance of the measurement. Above `gate` nothing is written.
     """
     distance, bends = 0.0, True
-    if has_own_noise(pair.measurement, work.innovation.predicted.shape[1]):
+    if len(pair.noise.own) + len(pair.noise.added) > 0:
         distance = _expect_and_whiten(sensor, pair, work)
         bends = work.innovation.bends[0]
     if bends and distance <= gate:

@@ -1,89 +1,113 @@
-"""Noise and likelihood ratio that single measurements bring with them.
+"""Noise and likelihood ratios that single measurements bring with them, see `Measurements`.
 
-The rows of such a scan are longer than a measurement of m components: behind these stand the lower triangle of the
-covariance of the row's noise, row by row, and the log likelihood ratio of its features (target over clutter), such as
-a signal-to-noise ratio. If targets have classes, one further log likelihood ratio for each class may follow, of
-features that differ between them.
-
-A variance of 0 leaves the component to the sensor's noise model. One below 0 is minus a variance that is added to that
-of the noise model, such as the error of the sensor's own pose. With a variance of `MISSING` a component was not
-measured. The likelihood ratio then makes up for the density of so wide a Gaussian, and clutter has the density of the
-other components.
+Each field of `Measurements` is there for all rows of a scan or empty. A component with an infinite variance was not
+measured. For it, an update has a variance so large that it has no effect, and the likelihood ratio of the row makes up
+for the density of so wide a Gaussian, while clutter has the density of the other components.
 """
 
 from __future__ import annotations
 
 import math
 
-from vedette.kernels.base.compile import inlined
-from vedette.kernels.base.types import Floats
+import numpy as np
+
+from vedette.kernels.base.compile import borrowing, inlined, kernel
+from vedette.kernels.base.types import Floats, Measurements, RowNoise
 
 MISSING = 1e16  # variance of a component that was not measured, SI: far above that of any state
+_LOG_RATIO_OF_MISSING = 0.5 * math.log(2.0 * math.pi * MISSING)
+
+
+@kernel
+def bare_measurements(values: Floats) -> Measurements:
+    """Return measurements (num, meas_dim) that bring nothing."""
+    dim = values.shape[1]
+    return Measurements(values, np.empty((0, dim, dim)), np.empty((0, dim, dim)), np.empty(0), np.empty((0, 0)))
 
 
 @inlined
-def row_length(meas_dim: int) -> int:
-    """Return the length of a row with noise and likelihood ratio, without ratios of classes."""
-    return int(meas_dim + meas_dim * (meas_dim + 1) // 2 + 1)
+def first_measurements(measurements: Measurements, num: int) -> Measurements:
+    """Return the first rows as views."""
+    return Measurements(
+        measurements.values[:num],
+        measurements.noise[:num],
+        measurements.added_noise[:num],
+        measurements.log_ratios[:num],
+        measurements.class_ratios[:num],
+    )
 
 
 @inlined
-def largest_class_ratio(measurement: Floats, meas_dim: int) -> float:
+def bring_noise(measurements: Measurements) -> bool:
+    """Return True if the rows bring noise, so that each needs an update of its own."""
+    return len(measurements.noise) + len(measurements.added_noise) > 0
+
+
+@inlined
+def noise_of_row(measurements: Measurements, j: int) -> RowNoise:
+    """Return the noise of row `j`, as views."""
+    return RowNoise(measurements.noise[j : j + 1], measurements.added_noise[j : j + 1])
+
+
+@inlined
+def no_row_noise(covs: Floats) -> RowNoise:
+    """Return the noise of a row that brings none, as views of any (num, meas_dim, meas_dim)."""
+    return RowNoise(covs[:0], covs[:0])
+
+
+@inlined
+def replace_noise(row: RowNoise, noise: Floats) -> None:
+    """Write a row's own covariance over that of the noise model (m, m), for components that have one, and add to it.
+
+    Components with a noise of their own are uncorrelated with those of the model.
+    """
+    has_own, is_added = len(row.own) > 0, len(row.added) > 0
+    for a in range(noise.shape[0] if has_own or is_added else 0):
+        for b in range(a + 1):
+            first, second = (row.own[0, a, a], row.own[0, b, b]) if has_own else (0.0, 0.0)
+            given = noise[a, b]
+            if first == math.inf or second == math.inf:
+                given = MISSING if a == b else 0.0
+            else:
+                if first > 0.0 and second > 0.0:
+                    given = row.own[0, a, b]
+                elif first > 0.0 or second > 0.0:
+                    given = 0.0
+                if is_added:
+                    given += row.added[0, a, b]
+            noise[a, b], noise[b, a] = given, given
+
+
+@borrowing
+def replace_all_noise(measurements: Measurements, covs: Floats) -> None:
+    """Write the covariances of the rows over those of the noise model (num, m, m), see `replace_noise`."""
+    for j in range(len(covs)):
+        replace_noise(noise_of_row(measurements, j), covs[j])
+
+
+@inlined
+def log_likelihood_ratio(measurements: Measurements, j: int) -> float:
+    """Return the log likelihood ratio of the features of row `j`, 0 without any, made up for what is missing."""
+    total = measurements.log_ratios[j] if len(measurements.log_ratios) > 0 else 0.0
+    for a in range(measurements.values.shape[1] if len(measurements.noise) > 0 else 0):
+        if measurements.noise[j, a, a] == math.inf:
+            total += _LOG_RATIO_OF_MISSING
+    return float(total)
+
+
+@borrowing
+def largest_class_ratio(measurements: Measurements, j: int) -> float:
     """Return the largest log likelihood ratio of a class, a bound on the factor of any component, or 0 without any."""
-    first = row_length(meas_dim)
-    largest = -math.inf if measurement.shape[0] > first else 0.0
-    for place in range(first, measurement.shape[0]):
-        largest = max(largest, measurement[place])
+    num = measurements.class_ratios.shape[1]
+    largest = -math.inf if num > 0 else 0.0
+    for k in range(num):
+        largest = max(largest, measurements.class_ratios[j, k])
     return largest
 
 
 @inlined
-def num_class_ratios(length: int, meas_dim: int) -> int:
-    """Return the number of likelihood ratios of classes in a row of this length."""
-    return max(length - row_length(meas_dim), 0)
-
-
-@inlined
-def has_own_noise(measurement: Floats, meas_dim: int) -> bool:
-    """Return True if a row of a scan, of any length, brings its noise."""
-    return measurement.shape[0] > meas_dim
-
-
-@inlined
-def place_of_variance(component: int, meas_dim: int) -> int:
-    """Return the place of the variance of a component in a row."""
-    return meas_dim + component * (component + 1) // 2 + component
-
-
-@inlined
-def is_missing(measurement: Floats, component: int, meas_dim: int) -> bool:
-    """Return True if a component of a row of any length was not measured."""
-    return measurement.shape[0] > meas_dim and measurement[place_of_variance(component, meas_dim)] >= MISSING
-
-
-@inlined
-def replace_noise(measurement: Floats, noise: Floats) -> None:
-    """Write a measurement's own covariance over that of the noise model (m, m), for the components that have one.
-
-    Components with a noise of their own are uncorrelated with those of the model. Variances below 0 are added.
-    """
-    m = noise.shape[0]
-    if not has_own_noise(measurement, m):
-        return
-    for a in range(m):
-        for b in range(a + 1):
-            own, also = measurement[place_of_variance(a, m)], measurement[place_of_variance(b, m)]
-            given = measurement[place_of_variance(a, m) - a + b]
-            if own < 0.0 and also < 0.0:
-                given = noise[a, b] + (abs(given) if a == b else given)
-            elif own <= 0.0 and also <= 0.0:
-                given = noise[a, b]
-            elif own == 0.0 or also == 0.0:
-                given = 0.0
-            noise[a, b], noise[b, a] = given, given
-
-
-@inlined
-def log_likelihood_ratio(measurement: Floats, meas_dim: int) -> float:
-    """Return the log likelihood ratio of a measurement's features, or 0 without any."""
-    return measurement[row_length(meas_dim) - 1] if has_own_noise(measurement, meas_dim) else 0.0
+def mark_missing(measurements: Measurements, j: int, out: Floats) -> None:
+    """Write the values of row `j`, (meas_dim,), with NaN for components that were not measured."""
+    for a in range(len(out)):
+        is_missing = measurements.noise[j, a, a] == math.inf
+        out[a] = math.nan if is_missing else measurements.values[j, a]

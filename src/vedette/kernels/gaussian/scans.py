@@ -80,7 +80,7 @@ def examined_scan(scan: Floats, least: Floats, periods: Floats) -> tuple[int, bo
     """The first row that is not finite, or -1; whether any component is below its least value; the largest component
     that repeats, in half periods; whether two rows begin with the same number.
 
-    scan: rows of measurements, which may be followed by their noise (`row_noise`).
+    scan: (num, meas_dim).
     """
     is_below, largest = False, 0.0
     for i in range(scan.shape[0]):

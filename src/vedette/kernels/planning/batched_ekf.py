@@ -27,6 +27,7 @@ from vedette.kernels.gaussian.innovation import (
 from vedette.kernels.gaussian.linalg import LOG_2PI
 from vedette.kernels.gaussian.prediction import predict
 from vedette.kernels.gaussian.relinearisation import Pair, PairWork, relinearise
+from vedette.kernels.gaussian.row_noise import no_row_noise
 from vedette.kernels.gaussian.scratch import Scratch, make_scratch
 from vedette.kernels.gaussian.sigma_points import LINEARISED, SWITCHED
 from vedette.kernels.planning.batched_models import (
@@ -371,8 +372,9 @@ def relinearise_batch(
         take_state(batch.means, s, work.mean)
         take_matrix(batch.covs, s, work.cov)
         take_state(measurements, s, work.measurement)
-        expect_measurement(sensor, pose, work.mean, work.cov, work.measurement, 0, work.innovation, work.scratch)
-        pair = Pair(pose, work.mean, work.cov, work.measurement)
+        none = no_row_noise(work.innovation.factor)
+        expect_measurement(sensor, pose, work.mean, work.cov, none, 0, work.innovation, work.scratch)
+        pair = Pair(pose, work.mean, work.cov, work.measurement, none)
         relinearise(sensor, pair, PairWork(work.innovation, work.scratch))
         _put_innovation(s, batch, work)
         for a in range(len(work.measurement)):

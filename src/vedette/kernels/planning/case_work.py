@@ -18,10 +18,11 @@ from vedette.kernels.association.predicted import Rows, make_rows
 from vedette.kernels.association.search import WIDEST, Search, grown_search, make_search
 from vedette.kernels.base.arrays import counted_ints, filled_ints
 from vedette.kernels.base.compile import inlined, kernel
-from vedette.kernels.base.types import Floats, Ints, Tracks
+from vedette.kernels.base.types import Floats, Ints, Measurements, Tracks
 from vedette.kernels.gaussian.components import borrowed_components, make_components
 from vedette.kernels.gaussian.marks import no_marks
 from vedette.kernels.gaussian.relinearisation import PairWork, make_pair_work
+from vedette.kernels.gaussian.row_noise import bare_measurements
 from vedette.kernels.steps.assembly import Naming, make_naming
 
 
@@ -38,7 +39,7 @@ class GlmbWork(NamedTuple):
 
     needed: Ints  # (1,) number of tracks that a case needs
     pair: PairWork  # and scratch arrays
-    measurements: Floats  # (most_measurements, meas_dim)
+    measurements: Measurements  # room for the ideal ones, which bring nothing
     log_clutter: Floats  # (most_measurements,)
     first_rows: Rows  # of the prior, for all samples of an action
     rows: Rows  # of a later belief
@@ -89,7 +90,7 @@ def view_belief(belief: CaseBelief, num_tracks: int, num_hyps: int, num_entries:
 @kernel
 def grown_work(work: GlmbWork) -> GlmbWork:
     """Return arrays with capacity for `needed` tracks, and for more children than now."""
-    most_measurements, meas_dim = work.measurements.shape
+    most_measurements, meas_dim = work.measurements.values.shape
     dim = work.rows.components.means.shape[1]
     rows, options, num = work.rows, work.options, work.needed[0]
     # Doubled, because a longer horizon will need still more tracks.
@@ -129,7 +130,7 @@ def make_work(num_tracks: int, num_sets: int, dim: int, meas_dim: int, most_meas
     work = GlmbWork(
         filled_ints(1, 2 * num_tracks),
         make_pair_work(dim, meas_dim),
-        np.empty((most_measurements, meas_dim)),
+        bare_measurements(np.empty((most_measurements, meas_dim))),
         np.empty(most_measurements),
         make_rows(num_tracks, num_tracks, like, meas_dim),
         make_rows(0, 0, like, meas_dim),

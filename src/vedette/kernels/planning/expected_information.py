@@ -21,6 +21,7 @@ from vedette.kernels.gaussian.innovation import Innovation, expect_measurement, 
 from vedette.kernels.gaussian.linalg import cholesky, inverse_from_factor
 from vedette.kernels.gaussian.prediction import predict
 from vedette.kernels.gaussian.relinearisation import Pair, PairWork, learn_at_mean
+from vedette.kernels.gaussian.row_noise import no_row_noise
 from vedette.kernels.gaussian.scratch import Scratch, make_scratch
 from vedette.kernels.gaussian.sigma_points import LINEARISED, SWITCHED
 from vedette.kernels.planning.batched_models import Offsets, fill_detection, find_offsets, make_offsets
@@ -80,13 +81,13 @@ def _update_cov(
     """
     n, prior, updated = len(mean), work.inverse, work.predicted_cov
     if sensor.method == LINEARISED or sensor.method == SWITCHED:
-        pair = Pair(pose, mean, cov, work.seen.predicted[0])
+        pair = Pair(pose, mean, cov, work.seen.predicted[0], no_row_noise(work.seen.factor))
         learn_at_mean(sensor, pair, detection, PairWork(work.seen, work.scratch))
         for i in range(n):
             for j in range(n):
                 out[i, j] = work.seen.covs[0, i, j]
         return
-    expect_measurement(sensor, pose, mean, cov, work.seen.predicted[0], 0, work.seen, work.scratch)
+    expect_measurement(sensor, pose, mean, cov, no_row_noise(work.seen.factor), 0, work.seen, work.scratch)
     _invert(cov, work.factor, prior)
     _invert(work.seen.covs[0], work.factor, updated)
     for i in range(n):

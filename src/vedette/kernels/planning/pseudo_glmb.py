@@ -23,6 +23,7 @@ from vedette.kernels.base.compile import borrowing, inlined, kernel
 from vedette.kernels.base.types import Floats, Glmb, Ints, ScanInput
 from vedette.kernels.gaussian.mixtures import match_components
 from vedette.kernels.gaussian.pooling import add_to_pool
+from vedette.kernels.gaussian.row_noise import first_measurements
 from vedette.kernels.planning.case_work import CaseBelief, GlmbWork, grown_work, has_rows, make_work, view_belief
 from vedette.kernels.planning.ideal import Decision, ideal_scan, most_targets
 from vedette.kernels.steps.assembly import name_tracks, update_tracks
@@ -75,8 +76,9 @@ def _update_cases(
             work.needed[0] = num_tracks
             if not has_rows(work, num_tracks):
                 return case
-            num = ideal_scan(decision, action, sample, step, work.pair.scratch, work.measurements)
-            scan = ScanInput(decision.birth, work.measurements[:num], horizon.poses[action, step], horizon.dt)
+            num = ideal_scan(decision, action, sample, step, work.pair.scratch, work.measurements.values)
+            ideal = first_measurements(work.measurements, num)
+            scan = ScanInput(decision.birth, ideal, horizon.poses[action, step], horizon.dt)
             # The first prediction depends on neither sample nor measurements: it is computed once per action.
             rows = work.first_rows if step == 0 else view_rows(work.rows, num_tracks)
             if step > 0 or action != prepared:

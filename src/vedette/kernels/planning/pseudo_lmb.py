@@ -21,10 +21,11 @@ from vedette.kernels.association.options import make_options, view_options, weig
 from vedette.kernels.association.predicted import Rows, leave_unseen, make_rows, predict_rows
 from vedette.kernels.base.arrays import counted_ints
 from vedette.kernels.base.compile import borrowing, kernel
-from vedette.kernels.base.types import Floats, Ints, Lmb, ScanInput, Tracks
+from vedette.kernels.base.types import Floats, Ints, Lmb, Measurements, ScanInput, Tracks
 from vedette.kernels.gaussian.components import copy_gaussian, make_components
 from vedette.kernels.gaussian.marks import no_marks
 from vedette.kernels.gaussian.relinearisation import PairWork, make_pair_work
+from vedette.kernels.gaussian.row_noise import bare_measurements, first_measurements
 from vedette.kernels.planning.ideal import Decision, ideal_scan, most_targets
 from vedette.kernels.steps.lmb import fill_existence, weigh_by_existence
 from vedette.kernels.steps.matching import MixtureRoom, make_mixture, match_rows
@@ -42,7 +43,7 @@ class LmbWork(NamedTuple):
     """Working arrays of a case, with one row per label of the prior."""
 
     pair: PairWork  # and scratch arrays
-    measurements: Floats  # (most_measurements, meas_dim)
+    measurements: Measurements  # room for the ideal ones, which bring nothing
     log_clutter: Floats  # (most_measurements,)
     first_rows: Rows  # of the prior, for all samples of an action
     rows: Rows  # of a later belief
@@ -65,7 +66,7 @@ def _make_work(prior: Lmb, meas_dim: int, most_measurements: int) -> LmbWork:
     tracks = Tracks(prior.tracks.labels, prior.tracks.offsets, room)
     return LmbWork(
         make_pair_work(dim, meas_dim),
-        np.empty((most_measurements, meas_dim)),
+        bare_measurements(np.empty((most_measurements, meas_dim))),
         np.empty(most_measurements),
         make_rows(num, num, room, meas_dim),
         make_rows(num, num, room, meas_dim),
@@ -113,8 +114,9 @@ def _update_cases(
     for case in range(first, last):
         action, sample = case // num_samples, case % num_samples
         for step in range(horizon.poses.shape[1]):
-            num = ideal_scan(decision, action, sample, step, work.pair.scratch, work.measurements)
-            scan = ScanInput(decision.birth, work.measurements[:num], horizon.poses[action, step], horizon.dt)
+            num = ideal_scan(decision, action, sample, step, work.pair.scratch, work.measurements.values)
+            ideal = first_measurements(work.measurements, num)
+            scan = ScanInput(decision.birth, ideal, horizon.poses[action, step], horizon.dt)
             # The first prediction depends on neither sample nor measurements: it is computed once per action.
             rows, current = (work.first_rows, prior) if step == 0 else (work.rows, belief)
             if step > 0 or action != prepared:

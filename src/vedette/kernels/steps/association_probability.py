@@ -29,7 +29,7 @@ def prob_explained(belief: Lmb, scan: ScanInput, sensor: Sensor, truncation: Tru
     expect_rows(sensor, scan, rows, make_scratch(belief.tracks.components.means.shape[1], len(sensor.periods)))
     weigh_by_existence(seen.existence_logit, rows)
     options, _, _ = weighed_options(rows, scan, sensor, truncation)
-    odds = np.zeros(len(scan.measurements))
+    odds = np.zeros(len(scan.measurements.values))
     for option in range(options.offsets[-1]):
         if options.columns[option] >= 0:
             odds[options.columns[option]] += math.exp(options.log_weights[option])

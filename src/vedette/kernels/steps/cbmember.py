@@ -169,7 +169,7 @@ def step_cb_member(
     existence_logit, lost = _bounded(prior.existence_logit, max_existence_logit)
     weigh_by_existence(existence_logit, rows)
     options, _, num_raised = weighed_options(rows, scan, sensor, truncation)
-    choices = list_choices(options, len(scan.measurements))
+    choices = list_choices(options, len(scan.measurements.values))
     logits = existence_logits(rows, options, choices)
     possible = _possible(logits)
     possible_logits = np.empty(len(possible))

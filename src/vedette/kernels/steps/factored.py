@@ -111,13 +111,13 @@ def _associate(
     """Weigh the options of all tracks and of the labels that the scan may begin. least_logit: of such a label."""
     rows = rows_of_scan(prior.tracks, scan, motion, sensor)
     weigh_singles(prior, rows)
-    log_levels = np.empty(len(scan.measurements))
+    log_levels = np.empty(len(scan.measurements.values))
     options, log_clutter, num_raised = weighed_options_at(rows, scan, sensor, truncation, log_levels)
     local = intensity_at_places(undetected)
     seen = seen_intensity(stacked_mixtures(undetected.intensity, local), scan, sensor)
-    presence = presence_of_rows(prior, len(rows.log_absent) + len(scan.measurements))
+    presence = presence_of_rows(prior, len(rows.log_absent) + len(scan.measurements.values))
     alone = alternatives_of(options, rows.labels, presence[: len(rows.log_absent)])
-    unclaimed = log_unclaimed(options, alone) if len(seen.log_absent) > 0 else np.zeros(len(scan.measurements))
+    unclaimed = log_unclaimed(options, alone) if len(seen.log_absent) > 0 else np.zeros(len(scan.measurements.values))
     label = undetected.step, undetected.first_index
     new = candidates_of(
         seen, len(local.log_weights), scan, sensor, log_levels, unclaimed, truncation.gate, least_logit, label

@@ -10,28 +10,27 @@ import math
 
 import numpy as np
 
-from vedette.kernels.association.options import log_clutter_at
+from vedette.kernels.association.options import log_clutter_of_row
 from vedette.kernels.association.truncation import Truncation
 from vedette.kernels.base.compile import inlined, kernel
-from vedette.kernels.base.types import Bools, Ints, Lmb, ScanInput, Sensor, Tracks
+from vedette.kernels.base.types import Bools, Floats, Ints, Lmb, ScanInput, Sensor, Tracks
 from vedette.kernels.gaussian.components import components_between, components_like, copy_components
 from vedette.kernels.gaussian.detection import detection_probability
 from vedette.kernels.gaussian.linalg import LOG_2PI, cholesky, log_det_from_factor, normalise_logs
 from vedette.kernels.gaussian.reduction import MixtureCaps, reduce_mixture
-from vedette.kernels.gaussian.row_noise import largest_class_ratio
+from vedette.kernels.gaussian.row_noise import bring_noise, largest_class_ratio
 from vedette.kernels.gaussian.scratch import Scratch, make_scratch
 
 _NOTHING = 2.0**-54  # negligible next to 1
 
 
 @kernel
-def _least_log_clutter(scan: ScanInput, sensor: Sensor, floor: float) -> float:
+def _least_log_clutter(scan: ScanInput, sensor: Sensor, floor: float, values: Floats) -> float:
     """Return the least log clutter intensity at the measurements over the ratio of classes, or inf without any."""
     least = math.inf
-    for j in range(len(scan.measurements)):
-        measurement = scan.measurements[j]
-        level = max(log_clutter_at(sensor, measurement, scan.pose), floor)
-        least = min(least, level - largest_class_ratio(measurement, len(sensor.periods)))
+    for j in range(len(scan.measurements.values)):
+        level = max(log_clutter_of_row(sensor, scan.measurements, j, scan.pose, values), floor)
+        least = min(least, level - largest_class_ratio(scan.measurements, j))
     return least
 
 
@@ -46,7 +45,7 @@ def _may_change(
     """
     mean, noise = tracks.components.means[c], scratch.measurement_noise
     chance = detection_probability(sensor, scan.pose, mean, tracks.components.covs[c], scratch.points[0])
-    if chance == 0.0 or chance > _NOTHING or scan.measurements.shape[1] > len(sensor.periods):
+    if chance == 0.0 or chance > _NOTHING or bring_noise(scan.measurements):
         return chance > 0.0
     if least_log_clutter == math.inf:
         return False
@@ -62,7 +61,7 @@ def in_view(tracks: Tracks, scan: ScanInput, sensor: Sensor, truncation: Truncat
     """Mask of the tracks that the scan may change, shape (num_tracks,)."""
     marks = np.zeros(len(tracks.labels), np.bool_)
     scratch = make_scratch(tracks.components.means.shape[1], len(sensor.periods))
-    least_log_clutter = _least_log_clutter(scan, sensor, truncation.log_clutter_floor)
+    least_log_clutter = _least_log_clutter(scan, sensor, truncation.log_clutter_floor, scratch.residual)
     for i in range(len(marks)):
         for c in range(tracks.offsets[i], tracks.offsets[i + 1]):
             if _may_change(tracks, c, scan, sensor, least_log_clutter, scratch):

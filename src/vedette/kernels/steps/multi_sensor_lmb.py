@@ -135,7 +135,7 @@ def update_lmb(
 ) -> tuple[Lmb, LmbReport]:
     """Return the LMB after one sensor's scan. `combinations` are those before the scan, at its time."""
     taken, seen = extend_combinations(combinations, 0, 0, scan, sensor, truncation)
-    posterior, report = lmb_of_combinations(taken, len(scan.measurements), truncation, reduction)
+    posterior, report = lmb_of_combinations(taken, len(scan.measurements.values), truncation, reduction)
     sums = MarginalSums(report.sums.log_total, report.sums.num_ranked, report.sums.log_kept + seen.log_kept)
     cut = seen.log_kept < 0.0
     return posterior, LmbReport(sums, seen.log_clutter, seen.num_raised, report.dropped_existence, cut)
