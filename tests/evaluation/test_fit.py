@@ -94,7 +94,7 @@ def test_innovations_are_those_of_a_kalman_filter() -> None:
     for k, (innovation, variances) in enumerate(matches, start=start + 1):
         mean, cov = transition @ mean, transition @ cov @ transition.T + process
         scan = scans[k][0]
-        assert scan is not None
+        assert isinstance(scan, np.ndarray)
         spread = cov[:2, :2] + 400.0 * np.eye(2)
         np.testing.assert_allclose(innovation, scan[0] - mean[:2], atol=1e-4)
         np.testing.assert_allclose(variances, np.diagonal(spread), rtol=1e-5)

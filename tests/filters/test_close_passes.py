@@ -10,6 +10,7 @@ import pytest
 from reference.polar import posterior
 from vedette import models
 from vedette.filters import DeltaGlmbFilter, LmbFilter
+from vedette.kernels.base.types import RowNoise
 from vedette.kernels.gaussian.innovation import expect, update_mean, whiten
 from vedette.kernels.gaussian.relinearisation import Pair, make_pair_work, relinearise
 
@@ -37,13 +38,16 @@ def scans(rng: Any, course: Any) -> tuple[Any, list[tuple[Any, Any]]]:
     return target, seen
 
 
+NO_NOISE = RowNoise(np.empty((0, 2, 2)), np.empty((0, 2, 2)))
+
+
 def update(own: models.SensorModel, pose: Any, mean: Any, cov: Any, measured: Any) -> tuple[Any, Any, float]:
     """Mean, covariance and log likelihood of a measurement, as filters take them."""
     kernel, work, after = own.to_kernel(), make_pair_work(len(mean), own.meas_dim), np.empty(len(mean))
     innovation, residual = work.innovation, work.scratch.residual
     expect(kernel, pose, mean, cov, 0, innovation, work.scratch)
     if innovation.bends[0]:
-        distance = relinearise(kernel, Pair(pose, mean, cov, measured), work)
+        distance = relinearise(kernel, Pair(pose, mean, cov, measured, NO_NOISE), work)
     else:
         distance = whiten(innovation, 0, measured, own.measurement.periods, np.inf, residual)
     update_mean(innovation, 0, residual, mean, after)

@@ -15,6 +15,7 @@ from vedette.kernels.base.types import ScanInput
 from vedette.kernels.steps.field_of_view import in_view
 from vedette.kernels.steps.multi_sensor_combinations import standing_combinations
 from vedette.kernels.steps.multi_sensor_lmb import update_lmb
+from vedette.models.scan_rows import to_measurements
 
 # Every label alone: lists of hypotheses are cut anew by each scan, also by one that says nothing of them.
 KINDS = [
@@ -91,7 +92,8 @@ def test_a_track_out_of_view_is_one_that_the_scan_leaves_as_it_was(off: float, m
     soft = sensor(models.soft_sector(0.95, 100.0, range_slope=0.1), nowhere)
     prior = LMB.from_bernoullis([(1, 0)], [0.5], [[off, 0.0, 0.0, 0.0]], [np.diag([9.0, 9.0, 1.0, 1.0])]).to_kernel()
     nobody = LMB.empty(4).to_kernel()
-    scan = ScanInput(nobody, np.array([[off, 0.0]] if measured else np.empty((0, 2))), np.zeros(3), 0.0)
+    measurements = to_measurements(np.array([[off, 0.0]] if measured else np.empty((0, 2))))
+    scan = ScanInput(nobody, measurements, np.zeros(3), 0.0)
     limits = Limits()
     rest = scan, soft.to_kernel(), limits.truncation(2)
     after, _ = update_lmb(standing_combinations(prior, 1), *rest, limits.keeping_labels().reduction())

@@ -91,7 +91,8 @@ def test_a_range_rate_that_may_be_one_of_several_is_none(kind: Any, stds: Any, o
         "clutter": models.around_sensor(2.0, "bearing_range", radius=150.0),
     }
     folded, other = make(kind, birth=NOBODY, **doppler(LARGEST, stds)), make(kind, birth=NOBODY, **plain)
-    rows, fewer = scan, scan[:, :2]
+    rows: Any = scan
+    fewer: Any = scan[:, :2]
     if own_noise:
         rows = models.ScanRows(scan, np.tile(stds, (2, 1)))
         fewer = models.ScanRows(fewer, np.tile(stds[:2], (2, 1)))

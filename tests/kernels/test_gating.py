@@ -12,6 +12,7 @@ from vedette.kernels.association.predicted import Rows, make_rows
 from vedette.kernels.gaussian.components import components_of
 from vedette.models.arguments import no_gaussians
 from vedette.models.measurement import wrap_angles
+from vedette.models.scan_rows import to_measurements
 
 GATE = 9.0
 
@@ -53,7 +54,7 @@ def test_all_gated_measurements_are_near(kind: str, tightness: float) -> None:
     for num_rows, num_measurements in ((40, 70), (1, 3), (5, 0), (0, 7)):
         rows = rows_of(rng, num_rows, spread, angular, tightness)
         scan = rng.uniform(-1.0, 1.0, (num_measurements, len(spread))) * spread
-        near = near_measurements(rows, scan, np.where(angular, 2.0 * math.pi, math.inf), GATE)
+        near = near_measurements(rows, to_measurements(scan), np.where(angular, 2.0 * math.pi, math.inf), GATE)
         assert near.offsets[0] == 0
         for row in range(num_rows):
             found = near.measurements[near.offsets[row] : near.offsets[row + 1]]
@@ -67,7 +68,7 @@ def test_few_others_are() -> None:
     spread, angular = KINDS["positions"]
     rng = np.random.default_rng(5)
     rows, scan = rows_of(rng, 300, spread, angular, 0.002), rng.uniform(-500.0, 500.0, (500, 2))
-    near = near_measurements(rows, scan, np.where(angular, 2.0 * math.pi, math.inf), GATE)
+    near = near_measurements(rows, to_measurements(scan), np.where(angular, 2.0 * math.pi, math.inf), GATE)
     inside = [distances(rows, c, scan, angular) <= GATE for c in range(rows.offsets[-1])]
     assert near.offsets[-1] <= 2 * np.sum(inside) < 0.02 * 300 * 500
 
@@ -76,5 +77,5 @@ def test_without_a_gate_every_measurement_is_near() -> None:
     spread, angular = KINDS["bearing and range"]
     rng = np.random.default_rng(7)
     rows, scan = rows_of(rng, 4, spread, angular, 0.05), rng.uniform(-3.0, 3.0, (6, 2))
-    near = near_measurements(rows, scan, np.where(angular, 2.0 * math.pi, math.inf), math.inf)
+    near = near_measurements(rows, to_measurements(scan), np.where(angular, 2.0 * math.pi, math.inf), math.inf)
     assert near.measurements[: near.offsets[-1]].tolist() == 4 * list(range(6))

@@ -9,6 +9,7 @@ import pytest
 
 from vedette import models
 from vedette.control.known_models import forms_of
+from vedette.kernels.base.types import RowNoise
 from vedette.kernels.gaussian.innovation import expect, make_innovation
 from vedette.kernels.gaussian.prediction import predict
 from vedette.kernels.gaussian.relinearisation import Pair, make_pair_work, relinearise
@@ -148,10 +149,11 @@ def test_gaussians_that_bend_are_updated_as_one_at_a_time(name: str) -> None:
     is_seen, scans = np.arange(ROOM) % 3 > 0, sensor.measurement.measure(means + rng.normal(size=(NUM, 4)), POSE)
     assert (work.bends[:NUM] & is_seen[:NUM]).any()
     measurements, pair = side_by_side(scans), make_pair_work(4, sensor.meas_dim)
+    none = RowNoise(pair.innovation.factor[:0], pair.innovation.factor[:0])
     relinearise_batch(sees, POSE, measurements, is_seen, NUM, batch, work)
     for s in np.flatnonzero(work.bends[:NUM] & is_seen[:NUM]):
         expect(sees, POSE, means[s], covs[s], 0, pair.innovation, pair.scratch)
-        relinearise(sees, Pair(POSE, means[s], covs[s], scans[s]), pair)
+        relinearise(sees, Pair(POSE, means[s], covs[s], scans[s], none), pair)
         np.testing.assert_allclose(measurements[:, s], pair.scratch.residual, rtol=1e-9, atol=1e-9)
         np.testing.assert_allclose(batch.whitened_cross[:, s], pair.innovation.whitened_cross[0].ravel(), rtol=1e-9)
         np.testing.assert_allclose(batch.log_norm[s], pair.innovation.log_norm[0])

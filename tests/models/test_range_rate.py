@@ -11,7 +11,7 @@ from scipy import stats
 from reference.differences import central_differences
 from vedette import models
 from vedette.errors import InputError
-from vedette.kernels.base.types import OWN_VELOCITY
+from vedette.kernels.base.types import OWN_VELOCITY, RowNoise
 from vedette.kernels.gaussian.innovation import expect_measurement, make_innovation
 from vedette.kernels.gaussian.scratch import make_scratch
 from vedette.models.clutter import at_raw_measurements
@@ -62,11 +62,14 @@ def sensor(method, noise=None):
     )
 
 
+NO_NOISE = RowNoise(np.empty((0, 3, 3)), np.empty((0, 3, 3)))
+
+
 def test_sigma_points_agree_with_the_jacobian_on_a_narrow_gaussian():
     cov, found = np.diag([4.0, 4.0, 0.25, 0.25]), []
     for method in ("ekf", "ukf", "ckf"):
         out = make_innovation(1, 4, 3)
-        expect_measurement(sensor(method).to_kernel(), POSE, STATES[0], cov, np.zeros(3), 0, out, make_scratch(4, 3))
+        expect_measurement(sensor(method).to_kernel(), POSE, STATES[0], cov, NO_NOISE, 0, out, make_scratch(4, 3))
         found.append((out.predicted[0], out.covs[0]))
     for predicted, posterior in found[1:]:
         np.testing.assert_allclose(predicted, found[0][0], rtol=1e-4)
@@ -76,7 +79,7 @@ def test_sigma_points_agree_with_the_jacobian_on_a_narrow_gaussian():
 def test_the_velocity_after_one_measurement_is_known_along_the_line_of_sight_alone():
     mean, cov = np.array([3000.0, 0.0, 0.0, 0.0]), np.diag([1e-6, 1e-6, 400.0, 400.0])
     out = make_innovation(1, 4, 3)
-    expect_measurement(sensor("ekf").to_kernel(), np.zeros(3), mean, cov, np.zeros(3), 0, out, make_scratch(4, 3))
+    expect_measurement(sensor("ekf").to_kernel(), np.zeros(3), mean, cov, NO_NOISE, 0, out, make_scratch(4, 3))
     along = 1.0 / (1.0 / 400.0 + 1.0 / 0.25)
     np.testing.assert_allclose(np.diag(out.covs[0])[2:], [along, 400.0], rtol=1e-6)
 

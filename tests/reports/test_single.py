@@ -15,6 +15,7 @@ from recordings import write_recording
 from reports.test_page import Words
 from vedette.cli import app
 from vedette.evaluation.runs import run_scenario
+from vedette.models.scan_rows import values_of
 from vedette.reports import write_run_report
 from vedette.reports.groups import group_of_run
 from vedette.reports.replay import replay_data
@@ -53,7 +54,7 @@ def test_measurements_are_those_of_the_recording(tmp_path: Path) -> None:
     for scans, poses, rows in zip(recording.scans, recording.poses, data["scans"], strict=True):
         for scan, pose, of_sensor in zip(scans, poses, rows, strict=True):
             assert len(of_sensor) == (0 if scan is None else len(scan))
-            for (bearing, distance), (_, x, y) in zip([] if scan is None else scan, of_sensor, strict=True):
+            for (bearing, distance), (_, x, y) in zip(() if scan is None else values_of(scan), of_sensor, strict=True):
                 place = pose[:2] + distance * np.array([math.cos(bearing), math.sin(bearing)])
                 np.testing.assert_allclose([x, y], place, atol=1.0)
 

@@ -67,7 +67,7 @@ def test_bearings_may_be_a_little_more_than_a_turn() -> None:
     def bearing(value: float) -> float:
         table = as_table({"time": [0.0], "range": [100.0], "bearing_deg": [value]})
         (scan,) = parse_scans(table, ALONE, Conventions({}, {}, "east")).scans[0]
-        assert scan is not None
+        assert isinstance(scan, np.ndarray)
         return float(scan[0, 0])
 
     assert bearing(360.05) == pytest.approx(math.radians(0.05))

@@ -113,7 +113,7 @@ def test_written_scans_are_read_again() -> None:
     for given, found in zip(scans_of_record(record, scenario), read.scans, strict=True):
         for one, other in zip(given, found, strict=True):
             assert one is not None
-            assert other is not None
+            assert isinstance(other, np.ndarray)
             np.testing.assert_allclose(other, one.measurements, atol=1e-9)
 
 
@@ -144,7 +144,7 @@ def test_flight_levels_and_feet_are_read_and_a_moving_height(tmp_path: Path) -> 
     recording = scenario_from_recording(tmp_path / "radars.yaml", tmp_path / "scans.csv").recording
     assert recording.unused == ()
     scan = recording.scans[0][0]
-    assert scan is not None
+    assert isinstance(scan, np.ndarray)
     np.testing.assert_allclose(scan, [[0.0, 18520.0, 330 * 30.48]], atol=1e-9)
     np.testing.assert_allclose(recording.poses[:, 0, OWN_HEIGHT], [304.8, 335.28])
 

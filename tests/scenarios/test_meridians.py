@@ -86,7 +86,7 @@ def test_two_radars_far_apart_see_a_ship_in_one_place() -> None:
     (truth,) = FAR.to_plane([SHIP[0]], [SHIP[1]])
     for s, site in enumerate(sites):
         scan = found.scans[s][s]
-        assert scan is not None
+        assert isinstance(scan, np.ndarray)
         angle, distance = scan[0]
         place = np.array(site.pose[:2]) + distance * np.array([math.cos(angle), math.sin(angle)])
         assert np.hypot(*(place - truth)) < 5.0
@@ -154,7 +154,7 @@ def test_scans_are_written_from_true_north_and_read_back() -> None:
     assert table["own_heading_deg"][0] == pytest.approx(expected, abs=1e-9)
     for scans, drawn in zip(found.scans, scans_of_record(record, scenario), strict=True):
         for scan, one in zip(scans, drawn, strict=True):
-            assert scan is not None
+            assert isinstance(scan, np.ndarray)
             assert one is not None
             np.testing.assert_allclose(scan, one.measurements, rtol=1e-12, atol=1e-12)
 
@@ -168,5 +168,5 @@ def test_without_an_origin_north_is_along_y() -> None:
     site = RecordedSensor("a", "bearing_only", (9e4, 0.0, 0.0))
     rows = {"time": [0.0], "sensor": ["a"], "bearing_deg": [30.0]}
     found_scans = parse_scans(as_table(rows), [site], Conventions({}, {}, "north"))
-    assert found_scans.scans[0][0] is not None
+    assert isinstance(found_scans.scans[0][0], np.ndarray)
     assert found_scans.scans[0][0][0, 0] == math.pi / 2.0 - 30.0 * (math.pi / 180.0)

@@ -103,7 +103,7 @@ def test_scans_that_are_written_are_read_again(run: tuple[Any, Scenario]) -> Non
     )
     np.testing.assert_array_equal(read.poses, record.poses)
     assert (read.unused, read.notes) == ((), ())
-    assert {scan.shape[1] for scans in read.scans for scan in scans if scan is not None} == {3}
+    assert {scan.shape[1] for s in range(read.poses.shape[1]) for scan in read.measured(s)} == {3}
 
 
 def test_a_moving_sensor_without_velocity_is_reported() -> None:

@@ -73,7 +73,7 @@ def test_rows_of_one_time_and_sensor_are_a_scan_and_empty_cells_a_scan_of_nothin
     np.testing.assert_array_equal(second[0], [[0.6, 1001.0], [3.0, 700.0]])
     assert second[1] is None
     assert third[0] is None
-    assert third[1] is not None
+    assert isinstance(third[1], np.ndarray)
     assert third[1].shape == (0, 2)
     np.testing.assert_array_equal(found.poses[:, 1, :2], [[100.0, 0.0]] * 3)
 
@@ -103,7 +103,7 @@ def test_frames_are_tables() -> None:
 def test_rows_may_come_in_any_order() -> None:
     shuffled = parsed([ROWS[i] for i in (4, 3, 0, 2, 1)])
     assert shuffled.times.tolist() == [0.0, 2.5, 5.0]
-    assert shuffled.scans[1][0] is not None
+    assert isinstance(shuffled.scans[1][0], np.ndarray)
     assert sorted(shuffled.scans[1][0][:, 1].tolist()) == [700.0, 1001.0]
 
 
@@ -120,7 +120,7 @@ def test_rows_may_come_in_any_order() -> None:
 )
 def test_lengths_are_in_the_unit_that_is_named(names: Any, conventions: Any, factor: float) -> None:
     scan = parsed(renamed(names), **conventions).scans[0][0]
-    assert scan is not None
+    assert isinstance(scan, np.ndarray)
     assert scan[0, 1] == 1000.0 * factor
 
 
@@ -130,7 +130,7 @@ def test_a_compass_counts_clockwise_from_north_in_degrees() -> None:
             {"bearing_rad": "bearing_deg"}, [{**ROWS[0], "bearing_rad": compass, "own_heading_deg": compass}]
         )
         found = parsed(rows, bearings="north")
-        assert found.scans[0][0] is not None
+        assert isinstance(found.scans[0][0], np.ndarray)
         assert math.cos(found.scans[0][0][0, 0] - math.radians(bearing)) == pytest.approx(1.0, abs=1e-12)
         assert math.cos(found.poses[0, 0, 2] - math.radians(bearing)) == pytest.approx(1.0, abs=1e-12)
 
@@ -139,11 +139,11 @@ def test_places_in_degrees_are_measured_and_sensors_carry_their_own() -> None:
     sites = [RecordedSensor("drone", "position", (0.0, 0.0, 0.0))]
     row = {"time": 0, "sensor": "drone", "lon": -1.12, "lat": 50.79, "own_lon": -1.13, "own_lat": 50.78}
     found = parsed([row], sites, ORIGIN)
-    assert found.scans[0][0] is not None
+    assert isinstance(found.scans[0][0], np.ndarray)
     np.testing.assert_array_equal(found.scans[0][0], ORIGIN.to_plane([-1.12], [50.79]))
     np.testing.assert_array_equal(found.poses[0, :, :2], ORIGIN.to_plane([-1.13], [50.78]))
     plane = parsed([{"time": 0, "sensor": "1", "x": 5, "y": "7.5", "own_x": 1, "own_y": 2}], sites)
-    assert plane.scans[0][0] is not None
+    assert isinstance(plane.scans[0][0], np.ndarray)
     assert (plane.scans[0][0].tolist(), plane.poses[0, 0, :2].tolist()) == ([[5.0, 7.5]], [1.0, 2.0])
 
 
@@ -462,8 +462,8 @@ def test_biases_are_taken_off_as_rows_are_read(bearings: Any, turn: float) -> No
     first, second, third = found.scans
     assert (first[1], second[1], third[0]) == (None, None, None)
     for before, after, distance in ((plain.scans[0][0], first[0], 800.0), (plain.scans[2][0], second[0], 1.0)):
-        assert before is not None
-        assert after is not None
+        assert isinstance(before, np.ndarray)
+        assert isinstance(after, np.ndarray)
         assert after[0, 1] == distance  # no range falls below a metre
         turned = math.remainder(before[0, 0] - after[0, 0], 2.0 * math.pi)
         assert turned == pytest.approx(turn * math.radians(2.0), abs=1e-12)
@@ -503,7 +503,7 @@ def test_rows_of_a_compass_sensor_need_no_setting(name: str, conventions: Any, b
     value = 0.5 if "units" in conventions else 30.0
     row = {"time": 0.0, "sensor": "radar", "range": 5.0, name: value}
     found = parsed([row], sites, **{"bearings": None, **conventions})
-    assert found.scans[0][0] is not None
+    assert isinstance(found.scans[0][0], np.ndarray)
     assert math.degrees(found.scans[0][0][0, 0]) == pytest.approx(bearing, abs=1e-12)
     assert found.bearings == (conventions.get("bearings", "north"),)
 
@@ -520,7 +520,7 @@ def test_each_sensor_has_its_own_bearing_convention() -> None:
         parsed([{"time": 0.0, "sensor": name, "bearing": 30.0} for name in "ab"], sites, bearings=None)
     biased = [RecordedSensor("a", "bearing_only", (0.0, 0.0, 0.0), Bias(bearing=0.1), compass=True)]
     found = parsed(rows[:1], biased, bearings=None)
-    assert found.scans[0][0] is not None  # clockwise, as it tells them
+    assert isinstance(found.scans[0][0], np.ndarray)  # clockwise, as it tells them
     assert found.scans[0][0][0, 0] == pytest.approx(math.radians(60.0) + 0.1, abs=1e-12)
 
 
@@ -549,7 +549,7 @@ def test_simulated_scans_are_written_as_they_are_read(tmp_path: Path, compass: s
         np.testing.assert_allclose(np.cos(found.poses[..., 2] - record.poses[..., 2]), 1.0)
         for scans, expected in zip(found.scans, scans_of_record(record, scenario), strict=True):
             for scan, drawn in zip(scans, expected, strict=True):
-                assert scan is not None
+                assert isinstance(scan, np.ndarray)
                 assert drawn is not None
                 np.testing.assert_allclose(scan, drawn.measurements, rtol=1e-12, atol=1e-12)
 
@@ -593,7 +593,7 @@ def test_a_bias_of_a_compass_is_the_same_simulated_and_read(tmp_path: Path) -> N
     drawn = scans_of_record(run_scenario(honest, "stationary", seed=3), honest)
     for scans, expected in zip(found.scans, drawn, strict=True):
         for scan, other in zip(scans, expected, strict=True):
-            assert scan is not None
+            assert isinstance(scan, np.ndarray)
             assert other is not None
             of_targets = other.origins >= 0
             assert of_targets.any()
@@ -695,7 +695,7 @@ def test_invalid_recordings_are_reported(folder: Path, old: str, new: str, words
 def test_units_are_read_from_the_ends_of_columns_in_either_case(column: str, size: float) -> None:
     columns = {} if column.startswith("range") else {"range": column}
     first = parsed(renamed({"range": column}), columns=columns).scans[0][0]
-    assert first is not None
+    assert isinstance(first, np.ndarray)
     assert first[0, 1] == pytest.approx(1000.0 * size)
 
 

@@ -109,7 +109,7 @@ def test_an_outlier_is_reported_with_its_row(tmp_path: Path) -> None:
 
 def test_a_scan_of_outliers_alone_is_empty(tmp_path: Path) -> None:
     scans = recorded(tmp_path, [*rows(), "80.0,R,300000.0,12.0"]).recording.scans
-    assert scans[-1][0] is not None
+    assert isinstance(scans[-1][0], np.ndarray)
     assert scans[-1][0].shape == (0, 2)
 
 

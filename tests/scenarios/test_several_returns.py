@@ -12,6 +12,7 @@ import pytest
 from vedette.errors import ScenarioError
 from vedette.evaluation.fit import fit_of_run
 from vedette.evaluation.runs import run_scenario
+from vedette.models import ScanRows
 from vedette.recorded import RecordedScans, RecordedSensor
 from vedette.recorded.merging import Spread, merged
 from vedette.recorded.returns import Extent, ReturnsModel, extents_of
@@ -102,13 +103,13 @@ def test_a_cluster_is_its_mean_across_the_end_of_bearings() -> None:
     recording = RecordedScans(np.zeros(1), 0.0, False, ((scan,),), poses, (), ("east",))
     found = merged(recording, [RecordedSensor("R", "bearing_range", (0.0, 0.0, 0.0))], [Extent(6.0, "as given")])
     (own,) = found.scans[0]
-    assert own is not None
-    np.testing.assert_allclose(own[:, :2], [[-math.pi + 0.001, 102.0], [0.5, 100.0]])
+    assert isinstance(own, ScanRows)
+    np.testing.assert_allclose(own.values, [[-math.pi + 0.001, 102.0], [0.5, 100.0]])
     ends = np.array([[math.cos(each[0]) * each[1], math.sin(each[0]) * each[1]] for each in scan[:2]])
     offsets = ends - [102.0 * math.cos(math.pi - 0.001), -102.0 * math.sin(math.pi - 0.001)]
     variance = (offsets**2).sum() / 6.0  # of three measurements in two axes
-    np.testing.assert_allclose(-own[:, 2], variance / own[:, 1] ** 2)  # below zero: added to the noise of the sensor
-    np.testing.assert_allclose(-own[:, 4], variance)
+    np.testing.assert_allclose(own.added_noise[:, 0, 0], variance / own.values[:, 1] ** 2)
+    np.testing.assert_allclose(own.added_noise[:, 1, 1], variance)
     assert found.notes[0].startswith(
         "R: returns of a scan within 6 m of each other are taken for one target (as given): 3 measurements became 2, "
         "their noise grew by"

@@ -145,7 +145,7 @@ def test_times_of_measurements_give_the_rotation_of_a_line() -> None:
     )
     for k in range(5, 20):
         time, scan, poses = recording.times[k] + recording.start, recording.scans[k][0], recording.poses[k]
-        assert scan is not None
+        assert isinstance(scan, np.ndarray)
         times = (time + lags(scan[:, 0], poses[0])).tolist()
         line = {"sensor": "R", "time": float(time), "measurements": scan.tolist(), "times": times}
         pose = read_message(json.dumps(line).encode(), "line", [site], how).scan.pose
@@ -249,7 +249,7 @@ def test_scans_of_a_simulated_radar_are_written_with_the_times_of_the_beam(tmp_p
     assert sum(len(scan.measurements) for scan in drawn) == read.num_measurements
     for time, (scan,), poses in zip(read.start + read.times, read.scans, read.poses, strict=True):
         k = int(np.abs(record.times - time).argmin())
-        assert scan is not None
+        assert isinstance(scan, np.ndarray)
         off = lags(scan[:, 0], poses[0]) + time - record.times[k] - lags(scan[:, 0], record.poses[k, 0])
         assert np.abs(np.remainder(off + 2.5, 5.0) - 2.5).max(initial=0.0) < 0.01
 

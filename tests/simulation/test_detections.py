@@ -59,7 +59,7 @@ def after(seconds: float) -> datetime.datetime:
 
 def places(found: RecordedScans, k: int) -> Any:
     scan = found.scans[k][0]
-    assert scan is not None
+    assert isinstance(scan, np.ndarray)
     ends = found.poses[k, 0, :2] + scan[:, 1:] * np.column_stack([np.cos(scan[:, 0]), np.sin(scan[:, 0])])
     return ends[np.lexsort(ends.T)]
 

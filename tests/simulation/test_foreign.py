@@ -218,7 +218,7 @@ def test_biases_of_a_radar_count_as_its_bearings_do(tmp_path: Path) -> None:
     (tmp_path / "radar.ast").write_bytes(plot(0.0, 5.0, 92.0))
     site = RecordedSensor("1/2", "bearing_range", (0.0, 0.0, 0.0), Bias(bearing=np.radians(2.0)))
     found = parse_scans(read_table(tmp_path / "radar.ast"), [site], Conventions({}, {}))
-    assert found.scans[0][0] is not None
+    assert isinstance(found.scans[0][0], np.ndarray)
     np.testing.assert_allclose(found.scans[0][0][0, 0], 0.0, atol=2.0 * np.pi / 2**16)
 
 
@@ -273,7 +273,7 @@ def test_tracks_of_a_system_are_scans_of_positions_and_reports(tmp_path: Path) -
     site = RecordedSensor("1/9", "position", (0.0, 0.0, 0.0))
     found = parse_scans(read_table(tmp_path / "system.ast"), [site], Conventions({}, {}), ORIGIN)
     assert found.times.tolist() == [0.0, 1.0]
-    assert found.scans[1][0] is not None
+    assert isinstance(found.scans[1][0], np.ndarray)
     np.testing.assert_allclose(found.scans[1][0], [[300.0, -400.0]], atol=1.0)  # 180 / 2^25 degrees
     (tmp_path / "both.ast").write_bytes(plot(86399.0, 5.0, 10.0) + content + track(2.0, lon, lat, 8))
     assert read_table(tmp_path / "both.ast").columns["range_nmi"] == [5.0]

@@ -115,8 +115,8 @@ def test_merged_rows_have_the_mean_ratio_and_a_class_only_if_they_agree() -> Non
         before: Any = recording.scans[0][0]
         found = merged(recording, [PLACE], [Extent(10.0, "as given")])
         scan, accuracy = (each[0][0] for each in (found.scans, found.accuracy))
-        assert scan is not None
-        assert accuracy is not None
+        assert isinstance(scan, ScanRows)
+        assert isinstance(accuracy, np.ndarray)
         for name in ("values", "class_ratios"):
             np.testing.assert_allclose(getattr(scan, name), getattr(before, name).mean(axis=0, keepdims=True))
         np.testing.assert_array_equal(accuracy[:, 0], [expected])
