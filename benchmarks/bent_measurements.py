@@ -22,7 +22,8 @@ sys.path.append(str(Path(__file__).resolve().parents[1] / "tests"))
 
 from reference.polar import posterior
 from vedette import models
-from vedette.kernels.gaussian.innovation import expect_measurement, update_mean, whiten
+from vedette.kernels.base.types import RowNoise
+from vedette.kernels.gaussian.innovation import expect, update_mean, whiten
 from vedette.kernels.gaussian.relinearisation import Pair, make_pair_work, relinearise
 
 DISTANCES = (100.0, 365.0, 1500.0, 5000.0, 20000.0)  # m
@@ -31,6 +32,9 @@ RANGE_NOISES = (1.0, 10.0, 50.0)  # m
 PRIORS = (5.0, 20.0, 50.0, 150.0, 500.0)  # m, along each axis
 METHODS = ("ekf", "ukf", "ckf", "auto")
 QUOTED = ((365.0, 0.17, 10.0, 50.0), (1500.0, 0.1, 10.0, 150.0), (20000.0, 1.0, 1.0, 500.0), (100.0, 0.05, 1.0, 500.0))
+
+
+NO_NOISE = RowNoise(np.empty((0, 2, 2)), np.empty((0, 2, 2)))  # of a measurement that brings none
 
 
 class Updater:
@@ -45,9 +49,9 @@ class Updater:
     def __call__(self, mean: Any, cov: Any, measurement: Any) -> tuple[Any, Any, bool]:
         """Mean and covariance after a measurement, and whether it bends."""
         innovation, scratch, out = self.work.innovation, self.work.scratch, np.empty(4)
-        expect_measurement(self.kernel, self.pose, mean, cov, innovation.predicted[0], 0, innovation, scratch)
+        expect(self.kernel, self.pose, mean, cov, 0, innovation, scratch)
         if innovation.bends[0]:
-            relinearise(self.kernel, Pair(self.pose, mean, cov, measurement), self.work)
+            relinearise(self.kernel, Pair(self.pose, mean, cov, measurement, NO_NOISE), self.work)
         else:
             whiten(innovation, 0, measurement, self.periods, np.inf, scratch.residual)
         update_mean(innovation, 0, scratch.residual, mean, out)
