@@ -78,4 +78,5 @@ def _height_above(own: dict[str, float], pose: Sequence[float], distance: float)
 
 
 def _product(jacobian: Floats, stds: PoseStds) -> Floats:
-    return np.asarray((jacobian * np.square(stds)) @ jacobian.T)
+    cov = np.tril((jacobian * np.square(stds)) @ jacobian.T)
+    return np.asarray(cov + np.tril(cov, -1).T)  # symmetric to the last bit

@@ -25,7 +25,7 @@ _OWN_POSE = ("own_x", "own_y", "own_lon", "own_lat", "own_heading")
 
 
 class Brought(NamedTuple):
-    """What a row brings with its measurement, see `vedette.models.ScanRows`."""
+    """Noise and likelihood ratios of a row, see `vedette.models.ScanRows`."""
 
     noise: Floats  # (m, m)
     added_noise: Floats  # (m, m)
