@@ -115,7 +115,7 @@ class LocalFilters:
             num, error = len(self.filters), unlimited.max_split_error
             unlimited = replace(unlimited, limits=limits, max_split_error=error / num, scans_together=num)
         if scan is None:
-            _, info = replace(unlimited, sensor=blind_sensor()).update(prediction, NO_SCAN, NO_POSE, rng=rng)
+            _, info = replace(unlimited, sensor=blind_sensor()).update(prediction, NO_SCAN.values, NO_POSE, rng=rng)
             return prediction, info
         return unlimited.update(prediction, scan, pose, rng=rng)
 
