@@ -22,7 +22,7 @@ from vedette.kernels.planning.ascent import Allowed
 from vedette.models import TargetModel
 from vedette.models.arguments import float_array, instance, reject, sequence, warn_if_degrees
 from vedette.platforms import Options, options_at
-from vedette.platforms.camera import HALF_WIDTH, POINTING
+from vedette.platforms.camera import POINTING, is_camera
 from vedette.platforms.operated import LEFT
 from vedette.tracking import State
 
@@ -180,8 +180,7 @@ def stationary_courses(options: Sequence[Options], mask: Mask | None) -> tuple[i
     stationary = []
     for s, own in enumerate(options):
         off = np.abs(own.courses - own.pose)
-        camera = len(own.pose) > HALF_WIDTH and own.pose[HALF_WIDTH] > 0.0
-        angles = [2, POINTING] if camera else [2]
+        angles = [2, POINTING] if is_camera(own.pose) else [2]
         off[:, :, angles] = np.abs(np.remainder(off[:, :, angles] + np.pi, 2.0 * np.pi) - np.pi)
         rest = np.delete(off[:, :, :LEFT], [0, 1, *angles], axis=2).sum(axis=2)
         candidates = np.flatnonzero(single_mask(mask, s, len(off)))

@@ -218,7 +218,7 @@ def _most_found(additive: AdditiveRewards) -> float:
         entries = slice(cells.offsets[first], cells.offsets[last])
         np.minimum.at(least, cells.cells[entries], cells.log_miss[entries])
         totals += least
-    return float(-(cells.worth @ np.expm1(totals)))
+    return float(-(cells.worth * np.expm1(totals)).sum())  # A dot product would depend on threads.
 
 
 def beyond_cutoff(evaluator: Evaluator, choice: Sequence[int]) -> Iterator[str]:

@@ -183,7 +183,7 @@ class AdditiveRewards:
             course = self.table.first_courses[s] + chosen[s]
             entries = slice(cells.offsets[course], cells.offsets[course + 1])
             totals[cells.cells[entries]] += cells.log_miss[entries]
-        return float(-(cells.worth @ np.expm1(totals)))
+        return float(-(cells.worth * np.expm1(totals)).sum())  # A dot product would depend on threads.
 
 
 def valuation_of(reward: Any, prediction: LMB, prior: Floats, undetected: float = 0.0) -> Valuation:
