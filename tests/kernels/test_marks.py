@@ -38,8 +38,6 @@ EDITS = {
         ),
         (f"{CLASSES_ALONE}\n", f"{{first}}{CLASSES_ALONE}\n"),
         (f"{CLASSES_ALONE} 0.0\n    for", f"{{first}}{CLASSES_ALONE} 0.0\n    for"),
-        ("        return Marks(np.asarray(", "        return Marks(marks.number[offsets[:-1]], np.asarray("),
-        ("Marks(*(column[:num].copy() for", "Marks(*(column[offsets[:-1]].copy() for"),
     ],
 }
 INSERTED = {
