@@ -179,10 +179,8 @@ def least_gospa_estimate(density: LabelledDensity, cutoff: float = 100.0, order:
     tracks, existence = take_tracks(lmb.tracks, likely), lmb.existence[likely]
     (_, means, covs, marks), errors = merged_tracks(tracks), np.empty(len(likely))
     for i, own in enumerate(map(slice, tracks.offsets[:-1], tracks.offsets[1:])):
-        points, spreads = (
-            np.vstack([means[i : i + 1], tracks.means[own]]),
-            np.vstack([covs[i : i + 1], tracks.covs[own]]),
-        )
+        points = np.vstack([means[i : i + 1], tracks.means[own]])
+        spreads = np.vstack([covs[i : i + 1], tracks.covs[own]])
         factors = np.linalg.cholesky(spreads[1:, :2, :2]).swapaxes(1, 2)
         nodes = points[1:, None, :2] + _NODES[:, : factors.shape[1]] @ factors
         ratios = np.minimum(np.linalg.norm(nodes - points[:, None, None, :2], axis=-1) / cutoff, 1.0)

@@ -13,7 +13,8 @@ from vedette.errors import InputError
 from vedette.kernels.base.compile import kernel
 from vedette.kernels.base.types import Floats
 from vedette.kernels.gaussian.row_noise import MISSING, replace_noise, row_length
-from vedette.models.arguments import float_array, real
+from vedette.models.arguments import float_array
+from vedette.models.fields import Real, check_fields
 
 LOG_RATIO_OF_MISSING = 0.5 * math.log(2.0 * math.pi * MISSING)  # makes up for the density of the wide Gaussian
 _STRONG_CLUTTER = 1e-3  # share of false measurements with the signal of a target
@@ -83,21 +84,20 @@ class SignalModel:
     as strong as targets are, which bounds the likelihood ratio.
 
     Attributes:
-        mean_db: mean ratio of targets, d, dB.
-        threshold_db: threshold of detection, t, dB.
-        clutter_db: mean power of clutter over that of the noise, c, dB. 0: false measurements are noise.
+        mean_db: mean ratio of targets, d [dB].
+        threshold_db: threshold above which the sensor reports a measurement, t [dB].
+        clutter_db: mean power of clutter over that of the noise, c. 0: false measurements are noise [dB].
 
     Raises:
         InputError: a number that is not finite.
     """
 
-    mean_db: float
-    threshold_db: float
-    clutter_db: float = 0.0
+    mean_db: Real
+    threshold_db: Real
+    clutter_db: Real = 0.0
 
     def __post_init__(self) -> None:
-        for name in ("mean_db", "threshold_db", "clutter_db"):
-            object.__setattr__(self, name, real(f"SignalModel.{name}", getattr(self, name)))
+        check_fields(self, "SignalModel.")
 
     def log_likelihood_ratio(self, snr_db: float) -> float:
         """Return the log likelihood ratio, target over false measurement, of a ratio in dB, below t that at t."""

@@ -49,7 +49,6 @@ class LmbWork(NamedTuple):
     near: Near  # every measurement with every row: ideal scans are small
     options: Options
     marginals: Floats  # (num_options,)
-    clusters: MarginalWork
     belief: Lmb  # after the latest step, one Gaussian per label
     all_rows: Ints  # 0, 1, 2, ...: all rows are kept
     mixture: MixtureRoom  # of one row
@@ -72,28 +71,9 @@ def _make_work(prior: Lmb, meas_dim: int, most_measurements: int) -> LmbWork:
         all_measurements(),
         options,
         np.empty(len(options.columns)),
-        make_marginal_work(num, most_measurements),
         Lmb(tracks, np.empty(num)),
         counted_ints(num),
         make_mixture(most_measurements + 1, dim),
-    )
-
-
-@kernel
-def _grown_work(work: LmbWork) -> LmbWork:
-    return LmbWork(
-        work.pair,
-        work.measurements,
-        work.log_clutter,
-        work.first_rows,
-        work.rows,
-        work.near,
-        work.options,
-        work.marginals,
-        grown_marginal_work(work.clusters),
-        work.belief,
-        work.all_rows,
-        work.mixture,
     )
 
 
@@ -106,8 +86,9 @@ def _update_cases(
     last: int,
     results: LmbResults,
     work: LmbWork,
+    clusters: MarginalWork,
 ) -> int:
-    """Update cases `first:last`. Returns `last`, or the case before which `work` must be grown."""
+    """Update cases `first:last`. Returns `last`, or the case before which `clusters` must be grown."""
     sensor, horizon, caps, belief = decision.sensor, decision.horizon, decision.truncation, work.belief
     num_samples, prepared, updated = len(decision.futures.offsets) - 1, -1, belief.tracks.components
     for case in range(first, last):
@@ -125,7 +106,7 @@ def _update_cases(
             prepared = action
             options = view_options(work.options, len(rows.log_absent), num)
             weigh_options(rows, work.near, scan, sensor, caps, work.log_clutter, work.pair, options)
-            sums, has_room = fill_marginals(options, caps.search, association, work.clusters, work.marginals)
+            sums, has_room = fill_marginals(options, caps.search, association, clusters, work.marginals)
             if not has_room:
                 return case
             if sums.log_total == -math.inf:
@@ -148,8 +129,10 @@ def pseudo_update_lmb(
 
     prior: one Gaussian per track. association: used instead of the sums over clusters.
     """
-    work = _make_work(prior, len(decision.sensor.periods), most_targets(decision.futures))
+    most_measurements = most_targets(decision.futures)
+    work = _make_work(prior, len(decision.sensor.periods), most_measurements)
+    clusters = make_marginal_work(len(prior.tracks.labels), most_measurements)
     while first < last:
-        first = _update_cases(prior, decision, association, first, last, results, work)
+        first = _update_cases(prior, decision, association, first, last, results, work, clusters)
         if first < last:
-            work = _grown_work(work)
+            clusters = grown_marginal_work(clusters)

@@ -57,11 +57,9 @@ def find_clusters(choices: Choices, num_columns: int) -> tuple[Ints, Ints]:
     contested: (num_columns,) 1 if more than one track may take the measurement.
     """
     num_tracks = len(choices.log_absent)
-    leaders, owners, contested = (
-        np.empty(num_tracks, np.int64),
-        filled_ints(num_columns, -1),
-        filled_ints(num_columns, 0),
-    )
+    leaders = np.empty(num_tracks, np.int64)
+    owners = filled_ints(num_columns, -1)
+    contested = filled_ints(num_columns, 0)
     for track in range(num_tracks):
         leaders[track] = track
         for choice in range(choices.offsets[track], choices.offsets[track + 1]):
@@ -108,11 +106,9 @@ def _order_members(choices: Choices, members: Ints, bit_of: Ints, num_bits: int)
     An open measurement may be taken both by earlier and by later members.
     """
     num = len(members)
-    wants, asked, is_open = (
-        np.zeros((num, num_bits), np.int64),
-        np.zeros(num_bits, np.int64),
-        np.zeros(num_bits, np.int64),
-    )
+    wants = np.zeros((num, num_bits), np.int64)
+    asked = np.zeros(num_bits, np.int64)
+    is_open = np.zeros(num_bits, np.int64)
     for i in range(num):
         for choice in range(choices.offsets[members[i]], choices.offsets[members[i] + 1]):
             for sensor in range(choices.columns.shape[1]):
@@ -171,11 +167,9 @@ def make_classes(choices: Choices, members: Ints, contested: Ints, class_of: Int
     num_words, most = max(1, (num_bits + _BITS - 1) // _BITS), len(members)
     for track in members:
         most += choices.offsets[track + 1] - choices.offsets[track]
-    offsets, masks, log_weights = (
-        np.zeros(len(members) + 1, np.int64),
-        np.empty((most, num_words), np.int64),
-        np.empty(most),
-    )
+    offsets = np.zeros(len(members) + 1, np.int64)
+    masks = np.empty((most, num_words), np.int64)
+    log_weights = np.empty(most)
     filled = 0
     for i in range(len(members)):
         first = filled
