@@ -27,10 +27,6 @@ EDITS = {
         ("Marks(np.empty((num, num_class", "Marks(np.empty((num, 0)), np.empty((num, num_class"),
         ("Marks(np.empty((num, 0)))", "Marks(np.empty((num, 0)), np.empty((num, 0)))"),
         ("Marks(marks.log_class_probs[first", "Marks(marks.number[first:last], marks.log_class_probs[first"),
-        (
-            "return marks.log_class_probs.shape[1] > 0",
-            "return marks.number.shape[1] + marks.log_class_probs.shape[1] > 0",
-        ),
         ("    for k in range(min(", "{copy}    for k in range(min("),
         (
             "    return True",

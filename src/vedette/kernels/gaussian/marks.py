@@ -39,12 +39,6 @@ def marks_between(marks: Marks, first: int, last: int) -> Marks:
 
 
 @inlined
-def has_marks(marks: Marks) -> bool:
-    """Return True if a column is in use."""
-    return marks.log_class_probs.shape[1] > 0
-
-
-@inlined
 def copy_marks(marks: Marks, source: int, out: Marks, target: int) -> None:
     """Copy the marks of component `source` to place `target`, in the columns that both have."""
     for k in range(min(marks.log_class_probs.shape[1], out.log_class_probs.shape[1])):

@@ -19,15 +19,13 @@ from vedette.kernels.association.gating import Near, all_measurements
 from vedette.kernels.association.marginals import Association, fill_marginals
 from vedette.kernels.association.options import make_options, view_options, weigh_options
 from vedette.kernels.association.predicted import Rows, leave_unseen, make_rows, predict_rows
-from vedette.kernels.base.arrays import counted_ints
 from vedette.kernels.base.compile import borrowing, kernel
-from vedette.kernels.base.types import Floats, Ints, Lmb, ScanInput, Tracks
-from vedette.kernels.gaussian.components import copy_gaussian, make_components
+from vedette.kernels.base.types import Floats, Ints, Lmb, Mixture, ScanInput, Tracks
+from vedette.kernels.gaussian.components import copy_gaussian, make_components, merge_all
 from vedette.kernels.gaussian.marks import no_marks
 from vedette.kernels.gaussian.relinearisation import PairWork, make_pair_work
 from vedette.kernels.planning.ideal import Decision, ideal_scan, most_targets
-from vedette.kernels.steps.lmb import fill_existence, weigh_by_existence
-from vedette.kernels.steps.matching import MixtureRoom, make_mixture, match_rows
+from vedette.kernels.steps.lmb import fill_existence, weigh_by_existence, write_mixture
 
 
 class LmbResults(NamedTuple):
@@ -50,8 +48,9 @@ class LmbWork(NamedTuple):
     options: Options
     marginals: Floats  # (num_options,)
     belief: Lmb  # after the latest step, one Gaussian per label
-    all_rows: Ints  # 0, 1, 2, ...: all rows are kept
-    mixture: MixtureRoom  # of one row
+    wide: Mixture  # of one row over its options
+    chosen: Ints  # (num,) the components of `wide`
+    weights: Floats  # (num,) their linear weights
 
 
 @kernel
@@ -72,8 +71,9 @@ def _make_work(prior: Lmb, meas_dim: int, most_measurements: int) -> LmbWork:
         options,
         np.empty(len(options.columns)),
         Lmb(tracks, np.empty(num)),
-        counted_ints(num),
-        make_mixture(most_measurements + 1, dim),
+        make_components(most_measurements + 1, dim, no_marks()),
+        np.empty(most_measurements + 1, np.int64),
+        np.empty(most_measurements + 1),
     )
 
 
@@ -114,7 +114,9 @@ def _update_cases(
                     "pseudo-update: no association has positive weight; do the models forbid the ideal scan?"
                 )
             fill_existence(options, work.marginals, belief.existence_logit)
-            match_rows(work.all_rows, rows, options, work.marginals, work.mixture, updated.means, updated.covs)
+            for row in range(len(belief.existence_logit)):
+                width = write_mixture(row, rows, options, work.marginals, work.wide)
+                merge_all(work.wide, width, work.chosen, work.weights, 0.0, updated, row)
         for i in range(len(belief.existence_logit)):
             results.logits[case, i] = belief.existence_logit[i]
             copy_gaussian(updated.means, updated.covs, i, results.means[case], results.covs[case], i)

@@ -7,6 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from vedette.kernels.association.clusters import root_of
 from vedette.kernels.base.arrays import filled_ints
 from vedette.kernels.base.compile import inlined, kernel
 from vedette.kernels.base.types import Floats, Ints
@@ -42,13 +43,6 @@ class Classes(NamedTuple):
     alive: Ints
 
 
-@inlined
-def _root(leaders: Ints, track: int) -> int:
-    while leaders[track] != track:
-        track = leaders[track]
-    return track
-
-
 @kernel
 def find_clusters(choices: Choices, num_columns: int) -> tuple[Ints, Ints]:
     """Return the leader of each track's cluster, and the contested measurements.
@@ -69,7 +63,7 @@ def find_clusters(choices: Choices, num_columns: int) -> tuple[Ints, Ints]:
                     continue
                 if owners[column] >= 0:
                     contested[column] = 1
-                    a, b = _root(leaders, owners[column]), _root(leaders, track)
+                    a, b = root_of(leaders, owners[column]), root_of(leaders, track)
                     leaders[max(a, b)] = min(a, b)
                 owners[column] = track
     return leaders, contested
@@ -79,7 +73,7 @@ def find_clusters(choices: Choices, num_columns: int) -> tuple[Ints, Ints]:
 def members_of(leaders: Ints, leader: int) -> Ints:
     members, count = np.empty(len(leaders) - leader, np.int64), 0
     for track in range(leader, len(leaders)):
-        if _root(leaders, track) == leader:
+        if root_of(leaders, track) == leader:
             members[count] = track
             count += 1
     return members[:count]
