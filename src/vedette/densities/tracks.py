@@ -199,8 +199,8 @@ def mixture_moments(log_weights: Floats, means: Floats, covs: Floats) -> tuple[F
     """
     if not (np.asarray(log_weights) > -math.inf).any():
         raise InputError("log_weights: expected a mixture of positive weight; got none")
-    whole = components_of(*(np.array(given, np.float64) for given in (log_weights, means, covs)))
-    merged = merged_mixtures(whole, np.array([0, len(log_weights)]))
+    log_weights, means, covs = (np.array(given, np.float64) for given in (log_weights, means, covs))
+    merged = merged_mixtures(components_of(log_weights, means, covs), np.array([0, len(log_weights)]))
     return merged.means[0], merged.covs[0]
 
 

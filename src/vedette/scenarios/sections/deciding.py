@@ -120,7 +120,7 @@ else:
 class Lookahead(Derived):
     """How many decisions the strategy `lookahead` takes at once, of which it carries out the first."""
 
-    depth: Annotated[Count, Field(le=100)]
+    depth: Annotated[Count, Field(le=100)] = 3
     method: Literal["beam", "tree"] = Field(
         default="beam",
         description="Search where there are more joint sequences than the budget: beams of sequences, sensor by "
