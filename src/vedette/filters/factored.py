@@ -161,7 +161,6 @@ class _FactoredFilterBase(LabelledFilterBase[FactoredGLMB]):
             dropped_existence=dropped,
             num_clutter_floored=sum(int(report.num_raised) for report in reports),
             num_duplicates=sum(map(len, repeats)),
-            num_inexact_clusters=0,
             search_truncated=any(bool(report.cut) for report in reports),
             limit_reached=is_full or any(bool(report.full) for report in reports),
             independence_error_bound=min(2.0, factoring),

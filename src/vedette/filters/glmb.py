@@ -72,7 +72,6 @@ class _GlmbFilterBase(LabelledFilterBase[GLMB]):
             dropped_existence=spread,
             num_clutter_floored=sum(num_raised),
             num_duplicates=sum(map(len, repeats)),
-            num_inexact_clusters=0,
             search_truncated=any(cut),
             limit_reached=any(full),
         )
