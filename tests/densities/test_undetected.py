@@ -46,7 +46,7 @@ def test_what_is_no_intensity_is_refused(expected: Any, message: str) -> None:
 
 def test_it_is_of_a_grid() -> None:
     grid: Any = "grid"
-    with pytest.raises(InputError, match=r"UndetectedIntensity\.grid: expected a CellGrid; got grid"):
+    with pytest.raises(InputError, match=r"UndetectedIntensity\.grid: expected a CellGrid; got str"):
         UndetectedIntensity(grid, np.zeros(6))
     with pytest.raises(InputError, match="total: expected a number of at least 0; got -1"):
         UndetectedIntensity.uniform(GRID, -1.0)

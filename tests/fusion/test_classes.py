@@ -13,7 +13,7 @@ from scipy.special import logsumexp
 from fusion.examples import A, B, by_label_set, full_glmbs, lmb
 from fusion.sights import views
 from vedette.densities import GLMB, LMB, FactoredGLMB, Marks, as_lmb
-from vedette.densities.tracks import mean_marks
+from vedette.densities.tracks import merged_tracks
 from vedette.errors import InputError
 from vedette.fusion import ArithmeticAverage, Clmb, CmDeltaGlmb, ParallelUpdate
 from vedette.fusion.rebasing import rebase
@@ -81,7 +81,7 @@ def test_arithmetic_average(seed: int) -> None:
     fused, _ = ArithmeticAverage(WEIGHTS).fuse(own)
     present = WEIGHTS[:, None] * [belief.existence for belief in own]
     expected = (present[..., None] * np.exp([belief.tracks.marks.log_class_probs for belief in own])).sum(0)
-    found = np.exp(mean_marks(fused.tracks).log_class_probs)
+    found = np.exp(merged_tracks(fused.tracks).marks.log_class_probs)
     np.testing.assert_allclose(found, expected / present.sum(0)[:, None], rtol=1e-9)
 
 

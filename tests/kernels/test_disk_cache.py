@@ -124,7 +124,7 @@ def test_a_stamp_of_a_model_covers_the_models_whose_kernels_it_calls() -> None:
 
 IMPORTS = """
 from vedette.kernels.gaussian.linalg import cholesky
-from vedette.kernels.planning.known_association import (  # a comment
+from vedette.kernels.planning.known_changes import (  # a comment
     Entries,
     fill_changes,
 )
@@ -138,7 +138,7 @@ def late():
 def test_every_way_to_import_a_kernel_is_found(tmp_path: Path) -> None:
     (tmp_path / "own.py").write_text(IMPORTS, encoding="utf-8")
     found = {path.relative_to(KERNELS).as_posix() for path in sources._kernel_imports(tmp_path / "own.py")}
-    assert found == {"gaussian/linalg.py", "planning/known_association.py", "labelled/gci.py", "steps/lmb.py"}
+    assert found == {"gaussian/linalg.py", "planning/known_changes.py", "labelled/gci.py", "steps/lmb.py"}
 
 
 def test_imports_are_found_as_a_parser_finds_them() -> None:

@@ -14,14 +14,9 @@ from vedette.kernels.gaussian.innovation import expect, make_innovation
 from vedette.kernels.gaussian.prediction import predict
 from vedette.kernels.gaussian.relinearisation import Pair, make_pair_work, relinearise
 from vedette.kernels.gaussian.scratch import make_scratch
-from vedette.kernels.planning.batched_ekf import (
-    expect_batch,
-    make_batch,
-    make_batch_work,
-    predict_batch,
-    relinearise_batch,
-)
+from vedette.kernels.planning.batched_innovation import expect_batch, relinearise_batch
 from vedette.kernels.planning.batched_models import ANY
+from vedette.kernels.planning.batched_prediction import make_batch, make_batch_work, predict_batch
 
 NUM, ROOM, DT = 11, 16, 1.5
 POSE = np.array([-300.0, 120.0, 0.4])

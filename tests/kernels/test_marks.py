@@ -27,10 +27,6 @@ EDITS = {
         ("Marks(np.empty((num, num_class", "Marks(np.empty((num, 0)), np.empty((num, num_class"),
         ("Marks(np.empty((num, 0)))", "Marks(np.empty((num, 0)), np.empty((num, 0)))"),
         ("Marks(marks.log_class_probs[first", "Marks(marks.number[first:last], marks.log_class_probs[first"),
-        (
-            "return marks.log_class_probs.shape[1] > 0",
-            "return marks.number.shape[1] + marks.log_class_probs.shape[1] > 0",
-        ),
         ("    for k in range(min(", "{copy}    for k in range(min("),
         (
             "    return True",
@@ -38,8 +34,6 @@ EDITS = {
         ),
         (f"{CLASSES_ALONE}\n", f"{{first}}{CLASSES_ALONE}\n"),
         (f"{CLASSES_ALONE} 0.0\n    for", f"{{first}}{CLASSES_ALONE} 0.0\n    for"),
-        ("        return Marks(np.asarray(", "        return Marks(marks.number[offsets[:-1]], np.asarray("),
-        ("Marks(*(column[:num].copy() for", "Marks(*(column[offsets[:-1]].copy() for"),
     ],
 }
 INSERTED = {

@@ -154,11 +154,11 @@ def test_a_grid_of_cells_up_to_a_size(cell_size: float, columns: int, rows: int)
 BAD: list[tuple[Any, str]] = [
     (lambda: CellGrid(REGION, 0, 4), "CellGrid.columns: expected a whole number of at least 1; got 0"),
     (lambda: CellGrid(REGION, 3, HALF), "CellGrid.rows: expected a whole number of at least 1; got 2.5"),
-    (lambda: CellGrid(ANY, 3, 2), "CellGrid.region: expected a Region; got box"),
+    (lambda: CellGrid(ANY, 3, 2), "CellGrid.region: expected a Region; got str"),
     (lambda: CellGrid.covering(REGION, 0.0), "cell_size: expected a number above 0; got 0"),
     (lambda: GRID.states(1), "state_dim: expected at least 2, px and py first; got 1"),
     (lambda: GRID.states(4, 0), "nodes_a_side: expected a whole number of at least 1; got 0"),
-    (lambda: UndetectedModel(ANY, 1.0), "UndetectedModel.grid: expected a CellGrid; got box"),
+    (lambda: UndetectedModel(ANY, 1.0), "UndetectedModel.grid: expected a CellGrid; got str"),
     (lambda: UndetectedModel(GRID, -1.0), "UndetectedModel.expected: expected a number of at least 0; got -1"),
     (lambda: UndetectedModel(GRID, np.ones(1)), r"UndetectedModel.expected: expected an array of shape \(24,\)"),
     (lambda: UndetectedModel(GRID, -np.ones(24)), "UndetectedModel.expected: expected numbers of at least 0; got"),
@@ -167,7 +167,7 @@ BAD: list[tuple[Any, str]] = [
     (lambda: UndetectedModel(GRID, 1.0, speed=math.inf), "UndetectedModel.speed: expected a finite number; got inf"),
     (
         lambda: UndetectedModel(GRID, 1.0, birth_density="sea"),  # type: ignore[arg-type]
-        "UndetectedModel.birth_density: expected uniform or boundary; got sea",
+        "UndetectedModel.birth_density: expected one of uniform, boundary; got sea",
     ),
     (lambda: UndetectedModel(GRID, 1.0, survival=1.5), "UndetectedModel.survival: expected a probability"),
     (lambda: UndetectedModel(GRID, 1.0).predict(np.zeros(24), -1.0, 1.0), "dt: expected a number of at least 0"),

@@ -111,8 +111,8 @@ def test_sections_go_to_workers_by_their_names(section: type[BaseModel]) -> None
 
 def test_a_plain_number_is_refused() -> None:
     """What it may be is not said, and it would be missing from the file unseen."""
-    with pytest.raises(TypeError, match=r"OraclePlanner\.cutoff: expected a type of .*; got float"):
-        derived("vedette.simulation.oracle:OraclePlanner")(Derived)
+    with pytest.raises(TypeError, match=r"Delay\.start: expected a type of .*; got float"):
+        derived("vedette.tracking.delays:Delay")(Derived)
 
 
 KIND = '''

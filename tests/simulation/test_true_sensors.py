@@ -107,7 +107,7 @@ def test_bad_true_sensors_are_named():
         TrueSensor(bearing, detection_of="measurement")
     with pytest.raises(InputError, match="detection_of: expected one of state, measurement; got both"):
         TrueSensor(bearing, detection_of="both")
-    with pytest.raises(InputError, match="first_detection: expected a DetectionModel or None; got 1"):
+    with pytest.raises(InputError, match="first_detection: expected a DetectionModel; got float"):
         TrueSensor(bearing, first_detection=1.0)  # type: ignore[arg-type]
     with pytest.raises(InputError, match=r"bias.range: expected 0, as no range is measured; got 3"):
         TrueSensor(bearing, bias=models.Bias(range=3.0))

@@ -14,7 +14,8 @@ from vedette.calibration.calibrating import Calibration, calibrate
 from vedette.calibration.parameters import Parameter, Problem
 from vedette.internal.quantities import COMPONENTS
 from vedette.kernels.base.types import Floats
-from vedette.models.arguments import float_array, instance, positive
+from vedette.models.arguments import float_array, positive
+from vedette.models.fields import Checked, Positive
 from vedette.models.scan_rows import values_of, with_values
 from vedette.recorded.scan_times import RecordedScan, group_by_time, poses_at_sites, remove_bias
 from vedette.tracking import SensorScan
@@ -98,7 +99,7 @@ class BiasEstimatorState:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class OnlineBiasEstimator:
+class OnlineBiasEstimator(Checked):
     """Estimates the sensors' biases from incoming scans at regular intervals, and removes them from the scans.
 
     Biases of measurements and positions are estimated from the first full window on. Clocks, noise, detection and
@@ -117,13 +118,8 @@ class OnlineBiasEstimator:
     """
 
     problem: Problem
-    window: float = 60.0
-    every: float = 30.0
-
-    def __post_init__(self) -> None:
-        instance("problem", self.problem, Problem)
-        positive("window", self.window)
-        positive("every", self.every)
+    window: Positive = 60.0
+    every: Positive = 30.0
 
     def initial(self) -> BiasEstimatorState:
         """Return the state before the first scan: biases at the parameters' start values."""

@@ -31,7 +31,7 @@ from vedette.kernels.association.marginals import Association
 from vedette.kernels.base.types import Bools, Floats, Ints
 from vedette.kernels.gaussian.linalg import log_sum
 from vedette.kernels.planning.ideal import Decision, SampledTrajectories
-from vedette.kernels.planning.known_association import pseudo_update_known
+from vedette.kernels.planning.known_changes import pseudo_update_known
 from vedette.kernels.planning.pseudo_glmb import GlmbResults, pseudo_update_glmb
 from vedette.kernels.planning.pseudo_lmb import LmbResults, pseudo_update_lmb
 from vedette.kernels.planning.reach import Belief as KnownBelief

@@ -14,7 +14,7 @@ from vedette.filters import Filter, Limits
 from vedette.internal.threads import processors
 from vedette.kernels.base.types import Bools, Floats
 from vedette.kernels.planning.ideal import EXPECTED, IDEAL, SAMPLED
-from vedette.models.arguments import float_array, instance, reject
+from vedette.models.arguments import float_array, reject
 from vedette.models.fields import (
     Chance,
     Count,
@@ -110,7 +110,6 @@ class PlanningSettings:
     def __post_init__(self) -> None:
         check_fields(self)
         own = self.limits
-        instance("limits", own, Limits)
         if own.max_components != 1 or own.min_existence != 0.0 or own.min_track_weight != 1.0:
             raise InputError(
                 "limits: expected max_components 1, min_existence 0 and min_track_weight 1, as in planning_limits()"

@@ -21,9 +21,8 @@ from vedette.densities.tracks import (
     TrackTable,
     gaussian_tracks,
     heaviest_components,
-    mean_marks,
+    merged_tracks,
     take_tracks,
-    track_moments,
 )
 from vedette.densities.unlabelled import IidCluster, Poisson
 from vedette.errors import InputError, NumericalError, VedetteError
@@ -178,12 +177,10 @@ def least_gospa_estimate(density: LabelledDensity, cutoff: float = 100.0, order:
     lmb = resolve_labels(check_labelled(density), max_components=_MARGINAL_COMPONENTS)
     likely = np.flatnonzero(lmb.existence > 0.5)  # others are not reported even if e is 0
     tracks, existence = take_tracks(lmb.tracks, likely), lmb.existence[likely]
-    (means, covs), errors = track_moments(tracks), np.empty(len(likely))
+    (_, means, covs, marks), errors = merged_tracks(tracks), np.empty(len(likely))
     for i, own in enumerate(map(slice, tracks.offsets[:-1], tracks.offsets[1:])):
-        points, spreads = (
-            np.vstack([means[i : i + 1], tracks.means[own]]),
-            np.vstack([covs[i : i + 1], tracks.covs[own]]),
-        )
+        points = np.vstack([means[i : i + 1], tracks.means[own]])
+        spreads = np.vstack([covs[i : i + 1], tracks.covs[own]])
         factors = np.linalg.cholesky(spreads[1:, :2, :2]).swapaxes(1, 2)
         nodes = points[1:, None, :2] + _NODES[:, : factors.shape[1]] @ factors
         ratios = np.minimum(np.linalg.norm(nodes - points[:, None, None, :2], axis=-1) / cutoff, 1.0)
@@ -191,7 +188,7 @@ def least_gospa_estimate(density: LabelledDensity, cutoff: float = 100.0, order:
         best = int(np.argmin(of_points))
         means[i], covs[i], errors[i] = points[best], spreads[best], of_points[best]
     chosen = np.flatnonzero(2.0 * existence * (1.0 - errors) > 1.0)
-    return _peaks(gaussian_tracks(tracks.labels, means, covs, mean_marks(tracks)), chosen, existence[chosen])
+    return _peaks(gaussian_tracks(tracks.labels, means, covs, marks), chosen, existence[chosen])
 
 
 def best_estimate(density: Any, step: int) -> Estimate:
@@ -226,7 +223,7 @@ def _peaks(tracks: TrackTable, chosen: Ints, existence: Floats) -> Estimate:
     heaviest = heaviest_components(tracks.log_weights, tracks.offsets, chosen)
     classes = checks.no_classes()
     if tracks.num_classes:
-        classes = np.exp(mean_marks(take_tracks(tracks, chosen)).log_class_probs)
+        classes = np.exp(merged_tracks(take_tracks(tracks, chosen)).marks.log_class_probs)
     return Estimate(tracks.labels[chosen], tracks.means[heaviest], tracks.covs[heaviest], existence, classes)
 
 

@@ -12,12 +12,14 @@ import numpy as np
 from vedette.densities import checks
 from vedette.densities.containers import MultiTarget, for_kernel, unchecked
 from vedette.densities.inspection import Hypothesis, Target, Targets, indices_or_none
-from vedette.densities.tracks import TrackTable, run_moments, take_tracks, track_moments
+from vedette.densities.tracks import TrackTable, merged_tracks, take_tracks
 from vedette.errors import InputError, NumericalError, VedetteError
 from vedette.internal.probabilities import expit
 from vedette.internal.text import pluralise
 from vedette.kernels.base import types as kt
 from vedette.kernels.base.types import Floats, Ints
+from vedette.kernels.gaussian.components import taken_components
+from vedette.kernels.gaussian.pooling import merged_mixtures
 from vedette.kernels.labelled.cardinality import convolved
 from vedette.kernels.labelled.conversions import factored_to_glmb
 
@@ -117,14 +119,16 @@ class LabelledDensity(MultiTarget):
     def _targets(self) -> Targets:
         labels, existence = self.label_existence()
         table, place = checks.distinct_labels(self.tracks.labels)
-        means, covs = track_moments(self.tracks)
+        merged = merged_tracks(self.tracks)
         if len(labels) == 0:
-            return Targets(labels, existence, means[:0], covs[:0])
+            return Targets(labels, existence, merged.means[:0], merged.covs[:0])
         weights, counts = self.track_existence, np.bincount(place)
         totals = np.bincount(place, weights)[place]
         shares = np.where(totals > 0.0, weights / np.where(totals > 0.0, totals, 1.0), 1.0 / counts[place])
         order = np.argsort(place, kind="stable")
-        moments = run_moments(shares[order], means[order], covs[order], checks.offsets_of(counts))
+        with np.errstate(divide="ignore"):
+            versions = taken_components(merged._replace(log_weights=np.log(shares)), order)
+        moments = merged_mixtures(versions, checks.offsets_of(counts))
         _, row = checks.distinct_labels(np.concatenate([table, labels]))  # the table may contain unused labels
         own = row[len(table) :]
         taken = self.tracks.measurements
@@ -132,8 +136,7 @@ class LabelledDensity(MultiTarget):
             chances = np.zeros((len(table), taken.max() + 2))  # per label: missed, then by measurement
             np.add.at(chances, (place, taken + 1), weights)
             taken = chances.argmax(axis=1)[own] - 1
-        means, covs = (part[own] for part in moments)
-        return Targets(labels, existence, means, covs, taken)
+        return Targets(labels, existence, moments.means[own], moments.covs[own], taken)
 
     def _parts(self) -> str:
         """Return the part of the summary after the labels."""

@@ -12,13 +12,13 @@ from vedette.densities import checks
 from vedette.densities.containers import for_kernel, no_components, unchecked
 from vedette.densities.inspection import Target, Targets
 from vedette.densities.labelled import poisson_binomial
-from vedette.densities.tracks import run_moments
 from vedette.densities.unlabelled import Unlabelled
 from vedette.errors import NumericalError, VedetteError
 from vedette.internal.probabilities import expit
 from vedette.kernels.base import types as kt
 from vedette.kernels.base.types import Floats, Ints
 from vedette.kernels.gaussian.marks import unmarked
+from vedette.kernels.gaussian.pooling import merged_mixtures
 
 
 @dataclass(frozen=True, slots=True, repr=False)
@@ -52,10 +52,8 @@ class MultiBernoulli(Unlabelled):
         return self._targets().each()
 
     def _targets(self) -> Targets:
-        if self.num_bernoullis == 0:
-            return Targets(None, self.existence, self.means, self.covs)
-        moments = run_moments(np.exp(self.log_weights), self.means, self.covs, self.offsets)
-        return Targets(None, self.existence, *moments)
+        merged = merged_mixtures(self._components(), for_kernel(self.offsets))
+        return Targets(None, self.existence, merged.means, merged.covs)
 
     @property
     def num_bernoullis(self) -> int:

@@ -17,8 +17,9 @@ from vedette.internal.text import pluralise
 from vedette.kernels.base import types as kt
 from vedette.kernels.base.types import Floats, Ints
 from vedette.kernels.gaussian.components import components_of, taken_components
-from vedette.kernels.gaussian.marks import merged_runs, unmarked
+from vedette.kernels.gaussian.marks import unmarked
 from vedette.kernels.gaussian.mixtures import heaviest_of_runs
+from vedette.kernels.gaussian.pooling import merged_mixtures
 
 UNSCANNED = -2  # replaces a measurement index
 _ARRAYS = kernel_arrays("labels", "offsets", *COMPONENTS)
@@ -188,7 +189,7 @@ def single_gaussians(tracks: TrackTable) -> TrackTable:
     """Return the tracks with each mixture replaced by one Gaussian of its moments."""
     if len(tracks.log_weights) == tracks.num_tracks:
         return tracks
-    return gaussian_tracks(tracks.labels, *track_moments(tracks), mean_marks(tracks))
+    return gaussian_tracks(tracks.labels, *merged_tracks(tracks)[1:])
 
 
 def mixture_moments(log_weights: Floats, means: Floats, covs: Floats) -> tuple[Floats, Floats]:
@@ -196,33 +197,22 @@ def mixture_moments(log_weights: Floats, means: Floats, covs: Floats) -> tuple[F
 
     Raises `InputError` for a mixture of weight zero.
     """
-    offsets = np.array([0, len(log_weights)])
-    log_total = checks.run_log_sums(log_weights, offsets)[0] if len(log_weights) else -math.inf
-    if log_total == -math.inf:
+    if not (np.asarray(log_weights) > -math.inf).any():
         raise InputError("log_weights: expected a mixture of positive weight; got none")
-    mean, cov = run_moments(np.exp(log_weights - log_total), means, covs, offsets)
-    return mean[0], cov[0]
+    log_weights, means, covs = (np.array(given, np.float64) for given in (log_weights, means, covs))
+    merged = merged_mixtures(components_of(log_weights, means, covs), np.array([0, len(log_weights)]))
+    return merged.means[0], merged.covs[0]
 
 
-def mean_marks(tracks: TrackTable) -> kt.Marks:
-    """Return the marks of every track, those of its components merged."""
-    return merged_runs(tracks.log_weights, tracks.offsets, tracks.marks)
+def merged_tracks(tracks: TrackTable) -> kt.Mixture:
+    """Return one component for each track, of its moments and with its marks merged, in new arrays."""
+    return merged_mixtures(tracks.to_kernel().components, for_kernel(tracks.offsets))
 
 
 def track_moments(tracks: TrackTable) -> tuple[Floats, Floats]:
     """Return the mean (num_tracks, state_dim) and covariance (num_tracks, state_dim, state_dim) of every track."""
-    if len(tracks.log_weights) == tracks.num_tracks:
-        return tracks.means.copy(), tracks.covs.copy()
-    return run_moments(np.exp(tracks.log_weights), tracks.means, tracks.covs, tracks.offsets)
-
-
-def run_moments(weights: Floats, means: Floats, covs: Floats, offsets: Ints) -> tuple[Floats, Floats]:
-    """Return the moments of consecutive mixtures of linear weights that sum to one, none of them empty."""
-    starts, lengths = offsets[:-1], np.diff(offsets)
-    run_means = np.add.reduceat(weights[:, None] * means, starts)
-    deviations = means - np.repeat(run_means, lengths, axis=0)
-    seconds = covs + deviations[:, :, None] * deviations[:, None, :]
-    return run_means, np.add.reduceat(weights[:, None, None] * seconds, starts)
+    merged = merged_tracks(tracks)
+    return merged.means, merged.covs
 
 
 def heaviest_components(log_weights: Floats, offsets: Ints, chosen: Ints) -> Ints:

@@ -13,7 +13,8 @@ from vedette.errors import InputError
 from vedette.internal.representation import SummaryRepr
 from vedette.kernels.base.types import Floats, Ints
 from vedette.models import CellGrid, Region
-from vedette.models.arguments import instance, non_negative, reject
+from vedette.models.arguments import non_negative, reject
+from vedette.models.fields import NonNegative, check_fields
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
@@ -37,15 +38,12 @@ class UndetectedTargets(SummaryRepr):
     birth_rate: LearntRate | None = None
 
     def __post_init__(self) -> None:
-        instance("UndetectedTargets.intensity", self.intensity, Poisson)
+        check_fields(self, "UndetectedTargets.")
         label = tuple(self.next_label)
         if len(label) != 2 or not all(isinstance(number, int) for number in label):
             raise reject("UndetectedTargets.next_label", "two whole numbers, birth step and index", self.next_label)
         object.__setattr__(self, "next_label", label)
-        if self.cells is not None:
-            instance("UndetectedTargets.cells", self.cells, UndetectedIntensity)
         if self.birth_rate is not None:
-            instance("UndetectedTargets.birth_rate", self.birth_rate, LearntRate)
             num = 0 if self.cells is None else self.cells.num_cells
             if len(self.birth_rate.unit) != num:
                 raise reject("UndetectedTargets.birth_rate.unit", f"{num} cells", f"{len(self.birth_rate.unit)}")
@@ -87,16 +85,15 @@ class LearntRate(SummaryRepr):
         InputError: an array of another shape, or a number that is negative or not finite.
     """
 
-    rate: float
-    exposure: float
+    rate: NonNegative
+    exposure: NonNegative
     unit: Floats
-    past: float
+    past: NonNegative
     labels: Ints
     shares: Floats
 
     def __post_init__(self) -> None:
-        for name in ("rate", "exposure", "past"):
-            object.__setattr__(self, name, non_negative(f"LearntRate.{name}", getattr(self, name)))
+        check_fields(self, "LearntRate.")
         labels = np.array(self.labels, np.int64)
         checks.check_array("LearntRate.labels", labels, np.int64, (None, 2))
         for name, shape in (("unit", (None,)), ("shares", (len(labels),))):
@@ -127,8 +124,7 @@ class UndetectedIntensity(SummaryRepr):
     expected: Floats
 
     def __post_init__(self) -> None:
-        if not isinstance(self.grid, CellGrid):
-            raise reject("UndetectedIntensity.grid", "a CellGrid", self.grid)
+        check_fields(self, "UndetectedIntensity.")
         field = "UndetectedIntensity.expected"
         expected = checks.as_floats(field, self.expected, (self.grid.num_cells,))
         checks.check_finite(field, expected, InputError)

@@ -13,7 +13,7 @@ from vedette.errors import InputError
 from vedette.filters import FactoredGlmbFilter
 from vedette.kernels.base.types import Bools, Floats, Mixture
 from vedette.kernels.gaussian.components import components_of, joined_components
-from vedette.kernels.gaussian.intensities import moved
+from vedette.kernels.gaussian.prediction import predicted_intensity
 from vedette.kernels.steps.undetected import WIDE
 from vedette.models import SensorModel, TargetModel
 from vedette.models.arguments import probability
@@ -67,7 +67,7 @@ class ObservationHistory:
         """Return a mixture at scan `first`, after survival and motion to scan `last`."""
         motion = kernel_motion(self.targets.motion, self.targets.survival)
         for scan in range(first + 1, last + 1):
-            mixture = moved(mixture, motion, self.scan_interval(scan))
+            mixture = predicted_intensity(mixture, motion, self.scan_interval(scan))
         return mixture
 
 

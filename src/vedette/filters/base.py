@@ -11,7 +11,6 @@ from typing import Any, ClassVar, Generic, NamedTuple, TypeAlias, TypeVar
 import numpy as np
 
 from vedette.densities import LMB, LabelledDensity
-from vedette.errors import InputError
 from vedette.filters.inputs import (
     births_for,
     check_belief,
@@ -35,6 +34,7 @@ from vedette.models import (
     position,
 )
 from vedette.models.arguments import generator, pose_vector, positive, step_number
+from vedette.models.fields import check_fields
 from vedette.models.scan_rows import to_measurements
 from vedette.models.sensor import with_default_detection_at
 
@@ -115,10 +115,7 @@ class SingleSensorFilter(WithBirths):
     limits: Limits = field(default_factory=Limits)
 
     def __post_init__(self) -> None:
-        for name, kind in (("targets", TargetModel), ("sensor", SensorModel), ("limits", Limits)):
-            value = getattr(self, name)
-            if not isinstance(value, kind):
-                raise InputError(f"{name}: expected a {kind.__name__}; got {type(value).__name__}")
+        check_fields(self)
         object.__setattr__(self, "sensor", with_default_detection_at(self.sensor, self.default_detection_at))
 
     def _inputs_after(

@@ -12,11 +12,11 @@ import numpy as np
 from vedette.densities import LMB, FactoredGLMB, LabelledDensity, UndetectedTargets
 from vedette.densities.checks import offsets_of
 from vedette.densities.label_sets import take_factors
-from vedette.errors import InputError, NumericalError
+from vedette.errors import NumericalError
 from vedette.filters.base import LabelledFilter, LabelledFilterBase, SensorStep, blind_sensor
 from vedette.filters.inputs import born_at, check_new, no_births_for_kernel
 from vedette.filters.limits import Limits
-from vedette.filters.multi_sensor import MultiSensorFilter, SequentialUpdate
+from vedette.filters.multi_sensor import SequentialUpdate
 from vedette.filters.protocols import FilterInfo
 from vedette.filters.region_births import arrivals_of, region_births, with_cells, with_deaths, with_learnt_rate
 from vedette.filters.undetected import (
@@ -37,7 +37,7 @@ from vedette.kernels.steps.factored import FactoredReport, step_factored
 from vedette.kernels.steps.field_of_view import in_view
 from vedette.kernels.steps.undetected import Arrivals
 from vedette.models import SensorModel
-from vedette.models.arguments import dimension, non_negative, one_of, step_number
+from vedette.models.arguments import step_number
 from vedette.models.fields import Count, L1Error
 
 # At a measurement, associations are cut while the sum of pairwise products is at most the split error, or this.
@@ -161,7 +161,6 @@ class _FactoredFilterBase(LabelledFilterBase[FactoredGLMB]):
             dropped_existence=dropped,
             num_clutter_floored=sum(int(report.num_raised) for report in reports),
             num_duplicates=sum(map(len, repeats)),
-            num_inexact_clusters=0,
             search_truncated=any(bool(report.cut) for report in reports),
             limit_reached=is_full or any(bool(report.full) for report in reports),
             independence_error_bound=min(2.0, factoring),
@@ -207,13 +206,8 @@ class FactoredGlmbFilter(_FactoredFilterBase, LabelledFilter[FactoredGLMB]):
 
     max_split_error: L1Error = 0.01
     max_factor_labels: Count = 20
-    scans_together: int = 1
+    scans_together: Count = 1
     births: Literal["poisson", "labelled"] = "poisson"
-
-    def __post_init__(self) -> None:
-        LabelledFilter.__post_init__(self)  # super() fails here, as slots=True replaces the class
-        _check_factoring(self.max_split_error, self.max_factor_labels, self.births)
-        dimension("scans_together", self.scans_together)
 
     def _blind(self) -> FactoredGlmbFilter:
         return replace(self, sensor=blind_sensor(), limits=self.limits.keeping_labels())
@@ -235,37 +229,23 @@ class SequentialFactoredFilter(_FactoredFilterBase, SequentialUpdate[FactoredGLM
     `FactoredGlmbFilter`.
     """
 
-    max_split_error: float = 0.01
-    max_factor_labels: int = 20
+    max_split_error: L1Error = 0.01
+    max_factor_labels: Count = 20
     births: Literal["poisson", "labelled"] = "poisson"
-
-    def __post_init__(self) -> None:
-        MultiSensorFilter.__post_init__(self)  # super() fails here, as slots=True replaces the class
-        _check_factoring(self.max_split_error, self.max_factor_labels, self.births)
 
     def _updated_in_view(
         self, prior: _Before, settled: Bools, step: SensorStep
     ) -> tuple[_Before, FactoredReport, Bools]:
         """Return `_run_kernel` of the factors that the scan may affect. The other factors come first, unchanged."""
         scan, _, sensor, truncation = step.inputs
-        density, marks = (
-            FactoredGLMB.from_kernel(prior.density),
-            in_view(prior.density.tracks, scan, sensor, truncation),
-        )
+        density = FactoredGLMB.from_kernel(prior.density)
+        marks = in_view(prior.density.tracks, scan, sensor, truncation)
         seen = np.diff(offsets_of(marks.astype(np.int64))[density.track_offsets]) > 0
         near, far = (take_factors(density, np.flatnonzero(places)) for places in (seen, ~seen))
         posterior, report = self._run_kernel(prior._replace(density=near.to_kernel()), step)
         both = [far, FactoredGLMB.from_kernel(posterior.density)]
         joined = FactoredGLMB.product(both, density.state_dim).to_kernel()
         return posterior._replace(density=joined), report, settled
-
-
-def _check_factoring(max_split_error: Any, max_factor_labels: Any, births: Any) -> None:
-    """Raise `InputError` for a field out of its range."""
-    if non_negative("max_split_error", max_split_error) > 2.0:
-        raise InputError(f"max_split_error: expected at most 2; got {max_split_error!r}")
-    dimension("max_factor_labels", max_factor_labels)
-    one_of("births", births, ("poisson", "labelled"))
 
 
 def _factoring(max_split_error: float, max_factor_labels: int, num_scans: int, max_merging: float) -> Factoring:

@@ -23,7 +23,6 @@ from vedette.internal.probabilities import expit
 from vedette.kernels.base.types import Glmb, Ints
 from vedette.kernels.labelled.conversions import marginalise
 from vedette.kernels.steps.glmb import StepReport, step_gibbs, step_ranked
-from vedette.models.arguments import flag
 
 
 class _GlmbFilterBase(LabelledFilterBase[GLMB]):
@@ -73,7 +72,6 @@ class _GlmbFilterBase(LabelledFilterBase[GLMB]):
             dropped_existence=spread,
             num_clutter_floored=sum(num_raised),
             num_duplicates=sum(map(len, repeats)),
-            num_inexact_clusters=0,
             search_truncated=any(cut),
             limit_reached=any(full),
         )
@@ -119,7 +117,6 @@ class DeltaGlmbFilter(_GlmbFilterBase, LabelledFilter[GLMB]):
         LabelledFilter.__post_init__(self)  # super() fails here, as slots=True replaces the class
         if not isinstance(self.assignment, JointAssociation):
             raise InputError(f"assignment: expected RankedAssignment or Gibbs; got {type(self.assignment).__name__}")
-        flag("marginalised", self.marginalised)
 
     def _blind(self) -> DeltaGlmbFilter:
         return replace(self, sensor=blind_sensor(), assignment=RankedAssignment())

@@ -26,6 +26,7 @@ from vedette.filters.protocols import FilterInfo
 from vedette.kernels.base.types import Bools, Floats, Ints, Lmb, Measurements, Motion, ScanInput
 from vedette.models import SensorModel, TargetModel, kernel_motion
 from vedette.models.arguments import generator, one_a_sensor, pose_vector, positive, reject, step_number
+from vedette.models.fields import check_fields
 from vedette.models.sensor import with_default_detection_at
 
 
@@ -73,10 +74,7 @@ class MultiSensorFilter(LabelledFilterBase[BeliefT]):
     limits: Limits = field(default_factory=Limits)
 
     def __post_init__(self) -> None:
-        for name, kind in (("targets", TargetModel), ("limits", Limits)):
-            value = getattr(self, name)
-            if not isinstance(value, kind):
-                raise InputError(f"{name}: expected a {kind.__name__}; got {type(value).__name__}")
+        check_fields(self)
         if not isinstance(self.sensors, Sequence) or len(self.sensors) == 0:
             raise reject("sensors", "a sequence of at least one SensorModel", self.sensors)
         for s, sensor in enumerate(self.sensors):

@@ -59,13 +59,13 @@ class FilterInfo:
     log_likelihood: float
     num_hypotheses: int
     num_tracks: int
-    truncation_error_bound: float
-    dropped_existence: float
-    num_clutter_floored: int
-    num_duplicates: int
-    num_inexact_clusters: int
-    search_truncated: bool
-    limit_reached: bool
+    truncation_error_bound: float = 0.0
+    dropped_existence: float = 0.0
+    num_clutter_floored: int = 0
+    num_duplicates: int = 0
+    num_inexact_clusters: int = 0
+    search_truncated: bool = False
+    limit_reached: bool = False
     independence_error_bound: float = 0.0
     reduction_error: float = 0.0
 

@@ -62,11 +62,7 @@ class UnlabelledFilter(SingleSensorFilter, ABC, Generic[_Density]):
             num_hypotheses=1,
             num_tracks=num_tracks,
             truncation_error_bound=discarded,
-            dropped_existence=0.0,
             num_clutter_floored=int(report.num_raised),
-            num_duplicates=0,
-            num_inexact_clusters=0,
-            search_truncated=False,
             limit_reached=num_tracks >= most,
         )
 

@@ -36,7 +36,7 @@ from vedette.kernels.base.types import Bools, Floats, Ints, Lmb
 from vedette.kernels.gaussian.pooling import pooled_tracks, reduced_tracks
 from vedette.kernels.gaussian.reduction import MixtureCaps
 from vedette.kernels.labelled.gci import fused_tracks
-from vedette.models.arguments import chance, flag
+from vedette.models.fields import Chance, check_fields
 
 
 @dataclass(frozen=True, slots=True)
@@ -77,15 +77,14 @@ class Clmb:
 
     weights: Sequence[float] | Floats
     mixture_power: MixturePower = "auto"
-    missing_existence: float = 1e-4
+    missing_existence: Chance = 1e-4
     limits: FusionLimits = field(default_factory=FusionLimits)
     field_of_view_weighting: bool = False
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "weights", check_weights(self.weights))
         check_power(self.mixture_power, self.limits, len(self.weights))
-        chance("missing_existence", self.missing_existence)
-        flag("field_of_view_weighting", self.field_of_view_weighting)
+        check_fields(self)
 
     def fuse(self, beliefs: Sequence[LabelledDensity], views: FieldsOfView | None = None) -> tuple[LMB, FusionInfo]:
         """Return the fused LMB in increasing label order, and the report. Beliefs that are not LMBs are converted.
@@ -205,7 +204,7 @@ class ArithmeticAverage:
     def __post_init__(self) -> None:
         object.__setattr__(self, "weights", check_weights(self.weights))
         check_power("moment_matched", self.limits, len(self.weights))
-        flag("field_of_view_weighting", self.field_of_view_weighting)
+        check_fields(self)
 
     def fuse(self, beliefs: Sequence[LabelledDensity], views: FieldsOfView | None = None) -> tuple[LMB, FusionInfo]:
         """Return the fused LMB in increasing label order, and the report. Beliefs that are not LMBs are converted.

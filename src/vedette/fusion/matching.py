@@ -17,7 +17,8 @@ from vedette.fusion.views import FieldsOfView
 from vedette.internal.probabilities import chi_squared_quantile
 from vedette.kernels.base.types import Floats, Ints
 from vedette.kernels.gaussian.distances import near_pairs
-from vedette.models.arguments import chance, instance, sequence
+from vedette.models.arguments import chance, sequence
+from vedette.models.fields import Chance, Checked
 
 GATE_PROBABILITY = 0.999  # probability that two estimates of one target are within the gate
 LIKELY = 0.5  # labels of at least this existence are matched first
@@ -168,7 +169,7 @@ def relabelled(belief: LabelledDensity, names: dict[Label, Label]) -> LabelledDe
 
 
 @dataclass(frozen=True, slots=True)
-class LabelMatchedFusion:
+class LabelMatchedFusion(Checked):
     """A fusion by labels that first matches labels across sensors (`match_labels`), so that they need not agree.
 
     For sensors that initiate targets at different steps or assign their own labels, and that do not continue from the
@@ -183,12 +184,8 @@ class LabelMatchedFusion:
     """
 
     rule: Fusion
-    gate_probability: float = GATE_PROBABILITY
+    gate_probability: Chance = GATE_PROBABILITY
     matches_labels: ClassVar[bool] = True  # labels may differ across sensors
-
-    def __post_init__(self) -> None:
-        instance("rule", self.rule, Fusion)
-        chance("gate_probability", self.gate_probability)
 
     def match(self, beliefs: Sequence[LabelledDensity]) -> list[LabelledDensity]:
         """Return the beliefs under common labels. Ambiguous labels of products of GLMBs are resolved first.

@@ -12,9 +12,9 @@ import numpy as np
 from vedette.densities import LMB, FactoredGLMB, LabelledDensity, TrackTable, as_lmb
 from vedette.densities.checks import offsets_of
 from vedette.densities.containers import unchecked
-from vedette.densities.conversions import marginalised_factors
+from vedette.densities.conversions import marginalised_factors, with_single_gaussians
 from vedette.densities.label_sets import WHOLE, in_label_order, join_factors
-from vedette.densities.tracks import mean_marks, places_of
+from vedette.densities.tracks import places_of
 from vedette.errors import InputError, NumericalError
 from vedette.fusion.base import FusionInfo, LogLinearPool, PrevalidatedBeliefs, check_beliefs, label_fusion_info
 from vedette.fusion.classes import class_gains, updated_classes
@@ -33,7 +33,7 @@ from vedette.fusion.views import FieldsOfView
 from vedette.internal.probabilities import expit, log_expit
 from vedette.kernels.base.types import Floats, Ints, Mixture, Tracks
 from vedette.kernels.gaussian.components import taken_components
-from vedette.kernels.gaussian.pooling import reduced_tracks
+from vedette.kernels.gaussian.pooling import merged_mixtures
 from vedette.kernels.labelled.parallel import update_in_parallel
 from vedette.kernels.labelled.stacking import stack_tracks
 from vedette.models.arguments import chance, non_negative, sequence
@@ -126,7 +126,7 @@ class ParallelUpdate:
         weights = np.ones(num_sensors) if self.weights is None else np.array(self.weights)
         fused: Any
         if all(belief.is_lmb for belief in (prediction, *given)):
-            single = [_moment_matched(as_lmb(belief)) for belief in (prediction, *given)]
+            single = [with_single_gaussians(as_lmb(belief)) for belief in (prediction, *given)]
             fused, info = self._fused_lmbs(single[0], single[1:], weights)
         else:
             factored = [FactoredGLMB.of(belief) for belief in given]
@@ -198,18 +198,14 @@ class ParallelUpdate:
             means, covs, log_overlaps = update_in_parallel(prior.means, prior.covs, chosen, weights, tracks, most)
         except FloatingPointError as fault:
             raise NumericalError(f"fusion of tracks: {fault}") from None
-        own, classes = mean_marks(TrackTable.from_kernel(tracks)).log_class_probs, prior.marks.log_class_probs
         fused = prior._replace(log_weights=np.zeros(len(means)), means=means, covs=covs)
+        classes = prior.marks.log_class_probs
         if classes.shape[1] == 0:
             return fused, log_overlaps
+        own = merged_mixtures(tracks.components, tracks.offsets).marks.log_class_probs
         gains = np.where((chosen >= 0)[..., np.newaxis], class_gains(own[chosen], classes[:, np.newaxis]), 0.0)
         classes, log_factors = updated_classes(classes, (weights[:, np.newaxis] * gains).sum(axis=1))
         return fused._replace(marks=prior.marks._replace(log_class_probs=classes)), log_overlaps + log_factors
-
-
-def _moment_matched(belief: LMB) -> LMB:
-    """Return the LMB with one Gaussian per track."""
-    return belief.with_fields(tracks=TrackTable.from_kernel(reduced_tracks(belief.tracks.to_kernel(), ONE)))
 
 
 def _prediction_of(views: FieldsOfView | None, *, check: bool) -> LabelledDensity:

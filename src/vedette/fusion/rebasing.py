@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from vedette.densities import LMB, TrackTable, track_moments
+from vedette.densities import LMB, TrackTable
 from vedette.densities.containers import unchecked
-from vedette.densities.tracks import gaussian_tracks, mean_marks, place_labels, take_tracks
+from vedette.densities.tracks import gaussian_tracks, merged_tracks, place_labels, take_tracks
 from vedette.fusion.classes import class_gains, updated_classes
 from vedette.kernels.base.types import Floats
 from vedette.kernels.labelled.stacking import stack_tracks
@@ -40,16 +40,14 @@ def rebase(posterior: LMB, own: LMB, prediction: LMB) -> LMB:
     """
     if own is prediction:
         return posterior
-    means, covs = track_moments(prediction.tracks)
-    logits = prediction.existence_logit.copy()
+    _, means, covs, marks = merged_tracks(prediction.tracks)
+    old, new, logits = merged_tracks(own.tracks), merged_tracks(posterior.tracks), prediction.existence_logit.copy()
     _, places = place_labels([belief.tracks.labels for belief in (prediction, own, posterior)])
     at, before, after = places[(places >= 0).all(axis=1)].T
-    own_means, own_covs = (moment[before] for moment in track_moments(own.tracks))
-    new_means, new_covs = (moment[after] for moment in track_moments(posterior.tracks))
-    means[at], covs[at], gained = _updated((means[at], covs[at]), (own_means, own_covs), (new_means, new_covs))
+    known_moments, said_moments = (old.means[before], old.covs[before]), (new.means[after], new.covs[after])
+    means[at], covs[at], gained = _updated((means[at], covs[at]), known_moments, said_moments)
     said, known = posterior.existence_logit[after], own.existence_logit[before]
-    marks, new, old = (mean_marks(belief.tracks) for belief in (prediction, posterior, own))
-    gains = class_gains(new.log_class_probs[after], old.log_class_probs[before])
+    gains = class_gains(new.marks.log_class_probs[after], old.marks.log_class_probs[before])
     marks.log_class_probs[at], log_factors = updated_classes(marks.log_class_probs[at], gains)
     with np.errstate(invalid="ignore"):  # an impossible or certain label that stays so carries no information
         logits[at] += np.where(said == known, 0.0, said - known) + gained + log_factors

@@ -15,7 +15,8 @@ from vedette.control.inputs import mask_of_decision, options_of, single_mask
 from vedette.densities import LabelledDensity, best_estimate
 from vedette.errors import InputError
 from vedette.kernels.base.types import Floats
-from vedette.models.arguments import as_array, dimension, reject
+from vedette.models.arguments import as_array, reject
+from vedette.models.fields import Checked, Count
 from vedette.platforms import Options
 from vedette.simulation import Schedule
 from vedette.tracking import State
@@ -38,7 +39,7 @@ class DecisionContext(NamedTuple):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class ObservationEncoder:
+class ObservationEncoder(Checked):
     """Converts decisions into observations and answers of a policy into actions, for environments and planners alike.
 
     Attributes:
@@ -56,10 +57,7 @@ class ObservationEncoder:
     settings: PlanningSettings
     constraints: tuple[Constraint, ...]
     schedule: Schedule
-    num_labels: int = 10
-
-    def __post_init__(self) -> None:
-        dimension("num_labels", self.num_labels)
+    num_labels: Count = 10
 
     @classmethod
     def of(cls, parts: Mapping[str, Any], num_labels: int = 10) -> ObservationEncoder:

@@ -51,13 +51,11 @@ class PersistentLoop:
         report: Callable[[str], object] = print,
     ) -> None:
         self.live, self.state = live, live.initial()
-        self._identity, self._snapshot, self._snapshot_interval, self._clock, self._report = (
-            identity,
-            snapshot,
-            snapshot_interval,
-            clock,
-            report,
-        )
+        self._identity = identity
+        self._snapshot = snapshot
+        self._snapshot_interval = snapshot_interval
+        self._clock = clock
+        self._report = report
         self._saved_at, self._saved_lines = clock(), 0
         self._path = record
         with contextlib.ExitStack() as locks:

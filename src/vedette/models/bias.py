@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass, fields
 
@@ -10,7 +9,7 @@ import numpy as np
 
 from vedette.internal.quantities import QUANTITIES
 from vedette.kernels.base.types import Floats
-from vedette.models.arguments import reject
+from vedette.models.fields import Real, check_fields
 from vedette.models.measurement import wrap_angles
 
 LEAST_RANGE = 1.0  # m; smallest range after a bias is subtracted or added
@@ -34,19 +33,17 @@ class Bias:
         InputError: a number that is not finite.
     """
 
-    range: float = 0.0
-    bearing: float = 0.0
-    clock: float = 0.0
-    x: float = 0.0
-    y: float = 0.0
-    range_rate: float = 0.0
-    elevation: float = 0.0
-    altitude: float = 0.0
+    range: Real = 0.0
+    bearing: Real = 0.0
+    clock: Real = 0.0
+    x: Real = 0.0
+    y: Real = 0.0
+    range_rate: Real = 0.0
+    elevation: Real = 0.0
+    altitude: Real = 0.0
 
     def __post_init__(self) -> None:
-        for each in fields(self):
-            if not math.isfinite(value := getattr(self, each.name)):
-                raise reject(f"Bias.{each.name}", "a finite number", value)
+        check_fields(self, "Bias.")
 
     def __sub__(self, other: Bias) -> Bias:
         """Return the difference of two biases, component by component."""

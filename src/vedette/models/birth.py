@@ -10,7 +10,8 @@ import numpy as np
 
 from vedette.kernels.base.types import Floats, Marks
 from vedette.kernels.gaussian.marks import unmarked
-from vedette.models.arguments import float_array, instance, no_gaussians, positive, positive_definite, real, reject
+from vedette.models.arguments import float_array, instance, no_gaussians, positive, positive_definite, reject
+from vedette.models.fields import Chance, check_fields
 from vedette.models.grid import CellGrid
 from vedette.models.region import Region
 from vedette.models.undetected import LEARNT, UndetectedModel
@@ -42,17 +43,14 @@ class MeasurementBirth:
     """
 
     expected: float | Literal["learnt"]
-    max_existence: float
+    max_existence: Chance
     std: Floats
     region: Region | None = None
 
     def __post_init__(self) -> None:
-        if self.region is not None:
-            instance("MeasurementBirth.region", self.region, Region)
+        check_fields(self, "MeasurementBirth.")
         if not self.is_learnt:
             object.__setattr__(self, "expected", positive("MeasurementBirth.expected", self.expected))
-        if not 0.0 < real("MeasurementBirth.max_existence", self.max_existence) < 1.0:
-            raise reject("MeasurementBirth.max_existence", "a probability above 0 and below 1", self.max_existence)
         std = float_array("MeasurementBirth.std", self.std, (None,))
         if len(std) < 2 or (std <= 0.0).any():
             raise reject("MeasurementBirth.std", "a standard deviation above 0 of each state component", std.tolist())
@@ -77,10 +75,8 @@ class MeasurementBirth:
         """
         if self.region is None:
             return None
-        grid, speed = (
-            CellGrid(self.region, cells_a_side, cells_a_side),
-            float(self.std[2]) if len(self.std) > 2 else 0.0,
-        )
+        grid = CellGrid(self.region, cells_a_side, cells_a_side)
+        speed = float(self.std[2]) if len(self.std) > 2 else 0.0
         if self.is_learnt:
             return UndetectedModel(grid, 1.0, birth_rate=LEARNT, speed=speed)
         return UndetectedModel(grid, 0.0, speed=speed)

@@ -6,11 +6,11 @@ the same part in a scenario reads and describes (`vedette.scenarios.sections.der
 
 from __future__ import annotations
 
-import inspect
 import math
 from collections.abc import Callable, Iterator
 from functools import cache, partial
-from typing import Annotated, Any, Literal, TypeAlias, TypeVar, get_args, get_origin, get_type_hints
+from types import NoneType, UnionType
+from typing import Annotated, Any, Literal, TypeAlias, TypeVar, Union, get_args, get_origin, get_type_hints
 
 from numpy.typing import ArrayLike
 
@@ -18,6 +18,8 @@ from vedette.models.arguments import (
     chance,
     count,
     dimension,
+    flag,
+    instance,
     is_infinite,
     non_negative,
     one_of,
@@ -101,7 +103,10 @@ def part(kind: str, room: str, **names: str) -> Callable[[T], T]:
 
 
 def check_fields(made: Any, prefix: str = "") -> None:
-    """Check the fields of a dataclass against their types. Optional fields may be None.
+    """Check the fields of a dataclass or named tuple against their types. Optional fields may be None.
+
+    Types are those of this module, words, bool, and classes and protocols of the library. Others are not checked. A
+    dataclass stores the checked numbers.
 
     Raises:
         InputError: an invalid field. The message has its name, the expected and the given value.
@@ -110,7 +115,9 @@ def check_fields(made: Any, prefix: str = "") -> None:
     for name, field, optional, check in _checks(kind, prefix):
         value = getattr(made, name)
         if value is not None or not optional:
-            check(field, value)
+            checked = check(field, value)
+            if checked is not None and checked is not value and not isinstance(made, tuple):
+                object.__setattr__(made, name, checked)
 
 
 class Checked:
@@ -129,14 +136,18 @@ def _checks(kind: type, prefix: str) -> tuple[tuple[str, str, bool, Callable[[st
 
 def _found(kind: type) -> Iterator[tuple[str, bool, Callable[[str, Any], Any]]]:
     hints = get_type_hints(kind, include_extras=True)
-    for name in inspect.get_annotations(kind):
-        alone = get_origin(hints[name]) in (Annotated, Literal)
-        options = (hints[name],) if alone else get_args(hints[name])
-        choices = [option for option in options if option is not type(None)]
-        if len(choices) != 1:
+    for name in kind.__match_args__:  # type: ignore[attr-defined]
+        hint = hints[name]
+        options = get_args(hint) if get_origin(hint) in (Union, UnionType) else (hint,)
+        choices = [option for option in options if option is not NoneType]
+        choice, words = choices[0], get_args(choices[0])
+        if len(choices) > 1:
             continue
-        optional, words = type(None) in options, get_args(choices[0])
-        if get_origin(choices[0]) is Annotated:
-            yield name, optional, words[1]
-        elif get_origin(choices[0]) is Literal:
-            yield name, optional, partial(one_of, words=words)
+        if get_origin(choice) is Annotated:
+            yield name, NoneType in options, words[1]
+        elif get_origin(choice) is Literal:
+            yield name, NoneType in options, partial(one_of, words=words)
+        elif choice is bool:
+            yield name, NoneType in options, flag
+        elif isinstance(choice, type) and choice.__module__.startswith("vedette."):
+            yield name, NoneType in options, partial(instance, kind=choice)

@@ -9,6 +9,7 @@ import numpy as np
 
 from vedette.kernels.base.types import Floats, Ints
 from vedette.models.arguments import dimension, instance, positive, reject
+from vedette.models.fields import Count, check_fields
 from vedette.models.region import Region
 
 # A side that is a whole number of cells, apart from rounding, is divided into that number.
@@ -30,14 +31,11 @@ class CellGrid:
     """
 
     region: Region
-    columns: int
-    rows: int
+    columns: Count
+    rows: Count
 
     def __post_init__(self) -> None:
-        if not isinstance(self.region, Region):
-            raise reject("CellGrid.region", "a Region", self.region)
-        for name in ("columns", "rows"):
-            object.__setattr__(self, name, dimension(f"CellGrid.{name}", getattr(self, name)))
+        check_fields(self, "CellGrid.")
 
     @classmethod
     def covering(cls, region: Region, cell_size: float) -> CellGrid:

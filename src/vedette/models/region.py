@@ -9,8 +9,8 @@ from numpy.typing import ArrayLike
 
 from vedette.internal.unit_warnings import look_like_degrees, warn_implausible
 from vedette.kernels.base.types import Bools, Floats
-from vedette.models.arguments import as_array, generator, real, reject
-from vedette.models.fields import Real
+from vedette.models.arguments import as_array, generator, reject
+from vedette.models.fields import Real, check_fields
 
 
 def warn_if_corners_in_degrees(field: str, corners: Floats) -> None:
@@ -38,8 +38,7 @@ class Region:
     y_max: Real
 
     def __post_init__(self) -> None:
-        for name in ("x_min", "x_max", "y_min", "y_max"):
-            object.__setattr__(self, name, real(f"Region.{name}", getattr(self, name)))
+        check_fields(self, "Region.")
         for low, high in (("x_min", "x_max"), ("y_min", "y_max")):
             if getattr(self, high) <= getattr(self, low):
                 raise reject(f"Region.{high}", f"a number above {low} = {getattr(self, low)}", getattr(self, high))

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from vedette.models.arguments import real
+from vedette.models.fields import Real, check_fields
 
 _STRONG_CLUTTER = 1e-3  # share of false measurements with the signal of a target
 
@@ -22,21 +22,20 @@ class SignalModel:
     as strong as targets are, which bounds the likelihood ratio.
 
     Attributes:
-        mean_db: mean ratio of targets, d, dB.
-        threshold_db: threshold of detection, t, dB.
-        clutter_db: mean power of clutter over that of the noise, c, dB. 0: false measurements are noise.
+        mean_db: mean ratio of targets, d [dB].
+        threshold_db: threshold above which the sensor reports a measurement, t [dB].
+        clutter_db: mean power of clutter over that of the noise, c. 0: false measurements are noise [dB].
 
     Raises:
         InputError: a number that is not finite.
     """
 
-    mean_db: float
-    threshold_db: float
-    clutter_db: float = 0.0
+    mean_db: Real
+    threshold_db: Real
+    clutter_db: Real = 0.0
 
     def __post_init__(self) -> None:
-        for name in ("mean_db", "threshold_db", "clutter_db"):
-            object.__setattr__(self, name, real(f"SignalModel.{name}", getattr(self, name)))
+        check_fields(self, "SignalModel.")
 
     def log_likelihood_ratio(self, snr_db: float) -> float:
         """Return the log likelihood ratio, target over false measurement, of a ratio in dB, below t that at t."""

@@ -6,9 +6,8 @@ from dataclasses import dataclass, field
 
 from vedette.errors import InputError
 from vedette.models.birth import BirthModel
+from vedette.models.fields import check_fields
 from vedette.models.motion import MotionModel, SurvivalModel
-
-_KINDS = {"motion": MotionModel, "survival": SurvivalModel, "birth": BirthModel}
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,10 +34,7 @@ class TargetModel:
     num_classes: int = field(init=False)
 
     def __post_init__(self) -> None:
-        for name, kind in _KINDS.items():
-            value = getattr(self, name)
-            if not isinstance(value, kind):
-                raise InputError(f"{name}: expected a {kind.__name__}; got {type(value).__name__}")
+        check_fields(self)
         object.__setattr__(self, "state_dim", self.motion.state_dim)
         object.__setattr__(self, "num_classes", self.birth.num_classes)
         if self.birth.state_dim != self.state_dim:

@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from vedette.kernels.base.types import BEAM, OWN_VELOCITY, Floats
-from vedette.models.arguments import float_array, pose_vector, positive
+from vedette.models.arguments import float_array, pose_vector
+from vedette.models.fields import Positive, check_fields
 
 
 @dataclass(frozen=True, slots=True)
@@ -17,18 +18,18 @@ class Turn:
     """Rotation of a radar.
 
     Attributes:
-        period: time of one turn, s.
-        clockwise: direction seen from above.
+        period: time of one turn [s].
+        clockwise: direction seen from above. True for most radars.
 
     Raises:
         InputError: the period is not above 0.
     """
 
-    period: float
+    period: Positive
     clockwise: bool = True
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "period", positive("Turn.period", self.period))
+        check_fields(self, "Turn.")
 
     @property
     def rate(self) -> float:

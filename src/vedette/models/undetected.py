@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 
 from vedette.kernels.base.types import Floats
 from vedette.kernels.steps.undetected import moved_in_cells
-from vedette.models.arguments import float_array, non_negative, positive, probability, reject
-from vedette.models.fields import NonNegative, Positive, Probability
+from vedette.models.arguments import float_array, non_negative, reject
+from vedette.models.fields import NonNegative, Positive, Probability, check_fields
 from vedette.models.grid import CellGrid
 
 # Standard deviations beyond which a Gaussian is taken as 0: the mass there is below the rounding of a sum.
@@ -48,21 +48,14 @@ class UndetectedModel:
     expected: float | Floats
     birth_rate: NonNegative | Literal["learnt"] = 0.0
     birth_density: Literal["uniform", "boundary"] = "uniform"
-    speed: float = 0.0
+    speed: NonNegative = 0.0
     survival: Probability | None = None
     prior_rate: Positive = 0.1
 
     def __post_init__(self) -> None:
-        if not isinstance(self.grid, CellGrid):
-            raise reject("UndetectedModel.grid", "a CellGrid", self.grid)
+        check_fields(self, "UndetectedModel.")
         if not self.is_learnt:
             object.__setattr__(self, "birth_rate", non_negative("UndetectedModel.birth_rate", self.birth_rate))
-        object.__setattr__(self, "prior_rate", positive("UndetectedModel.prior_rate", self.prior_rate))
-        object.__setattr__(self, "speed", non_negative("UndetectedModel.speed", self.speed))
-        if self.birth_density not in ("uniform", "boundary"):
-            raise reject("UndetectedModel.birth_density", "uniform or boundary", self.birth_density)
-        if self.survival is not None:
-            object.__setattr__(self, "survival", probability("UndetectedModel.survival", self.survival))
         field = "UndetectedModel.expected"
         if np.ndim(self.expected) == 0:
             object.__setattr__(self, "expected", non_negative(field, self.expected))

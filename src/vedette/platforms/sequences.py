@@ -8,7 +8,7 @@ import numpy as np
 
 from vedette.errors import InputError
 from vedette.kernels.base.types import Bools, Floats, Ints
-from vedette.models.arguments import dimension, positive
+from vedette.models.fields import Count, Positive, check_fields
 from vedette.platforms.base import Platform, actions_at, check_platform, course_of, prices_of, scans_of
 
 # Maximum number of sequences listed; it grows as a power of the number of actions.
@@ -36,13 +36,12 @@ class Sequences:
     """
 
     platform: Platform
-    period: float
-    depth: int
+    period: Positive
+    depth: Count
 
     def __post_init__(self) -> None:
         check_platform("platform", self.platform)
-        positive("period", self.period)
-        dimension("depth", self.depth)
+        check_fields(self)
 
     @property
     def columns(self) -> tuple[str, ...]:

@@ -10,8 +10,7 @@ import numpy as np
 from vedette.internal.text import pluralise
 from vedette.kernels.base.types import Floats, Ints
 from vedette.models import Region
-from vedette.models.arguments import reject
-from vedette.models.fields import NonNegative, Positive, check_fields
+from vedette.models.fields import Checked, NonNegative, Positive
 from vedette.recorded.reports import Reports
 
 
@@ -58,7 +57,7 @@ class CleaningCounts:
 
 
 @dataclass(frozen=True, slots=True)
-class Cleaning:
+class Cleaning(Checked):
     """Settings of the steps from reports to tracks, in this order.
 
     Attributes:
@@ -76,11 +75,6 @@ class Cleaning:
     min_speed: NonNegative = 0.0
     max_speed: Positive | None = None
     region: Region | None = None
-
-    def __post_init__(self) -> None:
-        check_fields(self)
-        if self.region is not None and not isinstance(self.region, Region):
-            raise reject("region", "a Region or None", self.region)
 
     def apply(self, reports: Reports) -> tuple[tuple[RecordedTrack, ...], CleaningCounts]:
         """Return the tracks in order of their first report, and the counts of what was left out."""

@@ -67,11 +67,9 @@ def found_turn(times: Floats, bearings: Floats) -> Turn | None:
     if len(at_once) and np.cos(bearings[at_once + 1] - bearings[at_once]).mean() < _FOUND:
         return None
     first_rows = np.flatnonzero(times <= times[0] + _SEARCHED_TIME)[:_SEARCHED_ROWS]
-    near, beams, span = (
-        times[first_rows] - times[0],
-        np.exp(1j * bearings[first_rows]),
-        float(times[first_rows[-1]] - times[0]),
-    )
+    near = times[first_rows] - times[0]
+    beams = np.exp(1j * bearings[first_rows])
+    span = float(times[first_rows[-1]] - times[0])
     if span < _FEWEST_TURNS * _PERIODS[0]:
         return None
     frequencies = np.arange(max(1.0 / _PERIODS[1], _FEWEST_TURNS / span), 1.0 / _PERIODS[0], 1.0 / (_STEPS * span))

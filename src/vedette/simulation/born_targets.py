@@ -9,7 +9,8 @@ from numpy.typing import ArrayLike
 
 from vedette.kernels.base.types import Floats
 from vedette.models import MotionModel, Region
-from vedette.models.arguments import float_array, generator, non_negative, probability
+from vedette.models.arguments import float_array, generator
+from vedette.models.fields import NonNegative, Probability, check_fields
 from vedette.simulation.truth import Truth, moved_states, scan_times, semidefinite_factor
 
 
@@ -33,18 +34,17 @@ class PoissonTargets:
     """
 
     motion: MotionModel
-    expected: float
+    expected: NonNegative
     mean: Floats
     cov: Floats
-    death_probability: float = 0.0
+    death_probability: Probability = 0.0
     region: Region | None = None
 
     def __post_init__(self) -> None:
+        check_fields(self, "PoissonTargets.")
         dim = self.motion.state_dim
         object.__setattr__(self, "mean", float_array("PoissonTargets.mean", self.mean, (dim,)))
         object.__setattr__(self, "cov", float_array("PoissonTargets.cov", self.cov, (dim, dim)))
-        non_negative("PoissonTargets.expected", self.expected)
-        probability("PoissonTargets.death_probability", self.death_probability)
         semidefinite_factor(self.cov)
 
     def truth(self, times: ArrayLike, *, rng: np.random.Generator) -> Truth:

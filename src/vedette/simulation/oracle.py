@@ -23,8 +23,8 @@ from vedette.errors import InputError
 from vedette.filters import common_target_model
 from vedette.kernels.base.types import Bools, Floats, Ints
 from vedette.models import MotionModel
-from vedette.models.arguments import dimension, generator, instance, positive
-from vedette.models.fields import Count
+from vedette.models.arguments import generator, instance
+from vedette.models.fields import Count, Positive, check_fields
 from vedette.platforms import Options
 from vedette.platforms.base import courses_of, scans_of
 from vedette.simulation.cramer_rao import CovarianceRecursion, scan_information, transition_jacobians
@@ -86,7 +86,7 @@ class OraclePlanner:
 
     sensors: tuple[MobileSensor, ...]
     schedule: Schedule
-    cutoff: float = 100.0
+    cutoff: Positive = 100.0
     depth: Count = 1
     beam_width: Count = 8
     settings: PlanningSettings = field(default_factory=PlanningSettings)
@@ -98,10 +98,7 @@ class OraclePlanner:
 
     def __post_init__(self) -> None:
         check_control_inputs(self)
-        positive("cutoff", self.cutoff)
-        dimension("depth", self.depth)
-        dimension("beam_width", self.beam_width)
-        instance("search", self.search, JointSearch)
+        check_fields(self)
         if self.truth is not None:
             object.__setattr__(self, "truth", with_components(self.truth, self._motion.state_dim))
 

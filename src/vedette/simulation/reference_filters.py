@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
@@ -15,7 +16,7 @@ from vedette.kernels.base.types import Floats
 from vedette.models import SensorModel, TargetModel
 from vedette.simulation.cramer_rao import scan_information, transition_jacobians
 from vedette.simulation.truth import Truth
-from vedette.tracking.program import UNKNOWN_VARIANCE, unknown_info
+from vedette.tracking.program import UNKNOWN_VARIANCE
 
 _SURE = 0.999
 _LOST = 1000.0  # m and m/s: standard deviation of a target before its first scan
@@ -50,7 +51,7 @@ class _Reference:
     ) -> tuple[LMB, FilterInfo]:
         """Return the estimates at that step. Raises `InputError` for an oracle without a truth."""
         ids, means, covs = self._estimated(scans, poses, dt, step, rng)
-        info = unknown_info(len(means))
+        info = FilterInfo(math.nan, 1, len(means))
         if len(means) == 0:
             return self.initial(), info
         labels = [(1, target) for target in ids]

@@ -4,13 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Literal
 
 from vedette.errors import InputError
 from vedette.internal.quantities import ONLY_MEASURED
 from vedette.kernels.base.types import Bools
 from vedette.models import Bias, DetectionModel, SensorModel
-from vedette.models.arguments import one_of, reject
+from vedette.models.arguments import reject
 from vedette.models.bias import NO_BIAS
+from vedette.models.fields import check_fields
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -33,20 +35,14 @@ class TrueSensor:
 
     model: SensorModel
     first_detection: DetectionModel | None = None
-    detection_of: str = "state"
+    detection_of: Literal["state", "measurement"] = "state"
     bias: Bias = NO_BIAS
 
     def __post_init__(self) -> None:
-        if not isinstance(self.model, SensorModel):
-            raise reject("TrueSensor.model", "a SensorModel", self.model)
-        if self.first_detection is not None and not isinstance(self.first_detection, DetectionModel):
-            raise reject("TrueSensor.first_detection", "a DetectionModel or None", self.first_detection)
-        one_of("TrueSensor.detection_of", self.detection_of, ("state", "measurement"))
+        check_fields(self, "TrueSensor.")
         if self.detection_of == "measurement" and self.model.measurement.places is None:
             expected = "state, as only a position or a bearing with a range say where a target was measured"
             raise reject("TrueSensor.detection_of", expected, self.detection_of)
-        if not isinstance(self.bias, Bias):
-            raise reject("TrueSensor.bias", "a Bias", self.bias)
         for name in ONLY_MEASURED:
             if getattr(self.bias, name) and name not in self.model.measurement.components:
                 raise reject(f"TrueSensor.bias.{name}", f"0, as no {name} is measured", getattr(self.bias, name))

@@ -9,7 +9,8 @@ from numpy.typing import ArrayLike
 
 from vedette.kernels.base.types import Bools, Floats, Ints
 from vedette.models import MotionModel, Region
-from vedette.models.arguments import dimension, float_array, generator, probability, reject
+from vedette.models.arguments import float_array, generator, reject
+from vedette.models.fields import Count, Probability, check_fields
 from vedette.simulation.truth import Truth, check_moved, scan_times, semidefinite_factor
 
 
@@ -33,20 +34,17 @@ class UniformTargets:
     """
 
     motion: MotionModel
-    number: int
+    number: Count
     region: Region
     std: Floats
-    death_probability: float = 0.0
+    death_probability: Probability = 0.0
 
     def __post_init__(self) -> None:
-        dimension("UniformTargets.number", self.number)
-        if not isinstance(self.region, Region):
-            raise reject("UniformTargets.region", "a Region", self.region)
+        check_fields(self, "UniformTargets.")
         std = float_array("UniformTargets.std", self.std, (self.motion.state_dim - 2,))
         if (std < 0.0).any():
             raise reject("UniformTargets.std", "numbers of at least 0", std.tolist())
         object.__setattr__(self, "std", std)
-        probability("UniformTargets.death_probability", self.death_probability)
 
     def truth(self, times: ArrayLike, *, rng: np.random.Generator) -> Truth:
         """Draw deaths, motion and births, scan by scan.

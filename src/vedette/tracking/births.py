@@ -22,7 +22,7 @@ from vedette.fusion.matching import OWN_LABELS
 from vedette.kernels.association.truncation import Truncation
 from vedette.kernels.base.types import Floats, Ints, Lmb, ScanInput
 from vedette.kernels.labelled.births import BirthsOfMeasurements, births_of_measurements
-from vedette.kernels.steps.association_probability import births_unexplained, prob_explained
+from vedette.kernels.steps.association_probability import prob_explained
 from vedette.models import BirthModel, MeasurementBirth, SensorModel
 from vedette.models.arguments import pose_vector, reject
 from vedette.models.scan_rows import as_scan, to_measurements
@@ -121,10 +121,8 @@ def births_from_scans(
     scans = [scan if sensor.measurement.places else None for sensor, scan in zip(sensors, scans, strict=True)]
     scanned = [s for s, scan in enumerate(scans) if scan is not None]
     checked = [pose_vector("pose", poses[s]) for s in scanned]
-    if len(scanned) == 1:
-        births = _births_of_single_sensor(belief, sensors[scanned[0]], scans[scanned[0]], checked[0], parameters)
-    else:
-        births = _births_of_pool(unexplained_measurements(model, belief, sensors, scans, poses), parameters)
+    found = unexplained_measurements(model, belief, sensors, scans, poses)
+    births = LMB.from_kernel(births_of_measurements(found.states, found.probabilities, parameters))
     births = with_velocities(births, model.std, sensors, scans, poses)
     return at_scan_time(births, checked)
 
@@ -199,18 +197,6 @@ def _unexplained_by_sensor(
     return UnexplainedMeasurements(states, 1.0 - explained[indices], np.full(len(indices), number))
 
 
-def _births_of_single_sensor(
-    belief: LabelledDensity, sensor: SensorModel, scan: Any, pose: Floats, parameters: BirthsOfMeasurements
-) -> LMB:
-    """Return the birth candidates from the scan of a single sensor."""
-    lmb = _as_kernel(belief)
-    scan_input = _scan_input(lmb, sensor, scan, pose)
-    states = sensor.measurement.states_at(scan_input.measurements.values, scan_input.pose, len(parameters.std))
-    models = sensor.to_kernel(), _truncation(sensor.meas_dim)
-    with model_errors():
-        return LMB.from_kernel(births_unexplained(lmb, scan_input, states, *models, MIN_UNEXPLAINED, parameters))
-
-
 @cache
 def _truncation(meas_dim: int) -> Truncation:
     """Return the default gates and clutter floor of filters."""
@@ -229,10 +215,8 @@ def _pool(measurements: UnexplainedMeasurements, model: MeasurementBirth) -> Une
             measurements.states[order], measurements.probabilities[order], np.empty(0, np.int64)
         )
     states, totals = np.empty(measurements.states.shape), np.zeros(len(order))
-    probabilities, members = (
-        np.empty(len(order)),
-        np.zeros((len(order), int(measurements.sensors.max(initial=0)) + 1), bool),
-    )
+    probabilities = np.empty(len(order))
+    members = np.zeros((len(order), int(measurements.sensors.max(initial=0)) + 1), bool)
     cells, num = _Cells(model.std[:2] * math.sqrt(_SAME_TARGET)), 0
     for i in order.tolist():
         near = cells.near(measurements.states[i, :2])
@@ -277,7 +261,3 @@ class _Cells:
     def _cell(self, place: Floats) -> tuple[float, float]:
         x, y = np.floor(place / self._size).tolist()
         return x, y
-
-
-def _births_of_pool(measurements: UnexplainedMeasurements, parameters: BirthsOfMeasurements) -> LMB:
-    return LMB.from_kernel(births_of_measurements(measurements.states, measurements.probabilities, parameters))

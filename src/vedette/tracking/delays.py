@@ -10,7 +10,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from vedette.kernels.base.types import Floats
-from vedette.models.arguments import count, instance, positive, probability, real, reject
+from vedette.models.arguments import count, instance, real, reject
+from vedette.models.fields import Positive, Probability, check_fields
 from vedette.tracking.base import State, TrackerInfo, TrackerWrapper, check_step
 from vedette.tracking.out_of_sequence import OutOfSequenceTracker, SensorScan, Timeline
 
@@ -29,15 +30,14 @@ class Delay:
         InputError: a probability outside 0 to 1, times that are not numbers, or an end before the start.
     """
 
-    probability: float
-    max_delay: float
+    probability: Probability
+    max_delay: Positive
     start: float = -math.inf
     end: float = math.inf
     window: float = math.inf
 
     def __post_init__(self) -> None:
-        probability("Delay.probability", self.probability)
-        positive("Delay.max_delay", self.max_delay)
+        check_fields(self, "Delay.")
         if not self.window >= 0.0:
             raise reject("Delay.window", "seconds, at least 0", self.window)
         if not self.start <= self.end:

@@ -15,7 +15,8 @@ from vedette.errors import InputError
 from vedette.internal.representation import SummaryRepr, TabularRepr
 from vedette.internal.text import pluralise
 from vedette.kernels.base.types import Floats
-from vedette.models.arguments import as_array, count, dimension, instance, pose_vector, positive, real, reject
+from vedette.models.arguments import as_array, count, instance, pose_vector, real, reject
+from vedette.models.fields import Count, Limit, Natural, check_fields
 from vedette.models.scan_rows import ScanLike, ScanRows, table_of
 from vedette.tracking.base import State, Tracker, TrackerInfo
 
@@ -152,17 +153,13 @@ class OutOfSequenceTracker:
 
     tracker: Tracker
     poses: Any
-    window: float = 30.0
-    seed: int = 0
-    max_entries: int = 10_000
+    window: Limit = 30.0
+    seed: Natural = 0
+    max_entries: Count = 10_000
     _start: Floats = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
-        instance("tracker", self.tracker, Tracker)
-        if self.window != math.inf:
-            positive("window", self.window)
-        count("seed", self.seed)
-        dimension("max_entries", self.max_entries)
+        check_fields(self)
         num = len(self.tracker.sensors)
         given = [pose_vector(f"poses[{s}]", pose) for s, pose in enumerate(self.poses)]
         if len(given) != num:

@@ -90,7 +90,7 @@ class ProgramFilter:
         labels = [self._names.setdefault(row.label, (step, i)) for i, row in enumerate(rows)]
         if len(set(labels)) < len(labels):
             self._program.refuse("estimates of different labels", str([row.label for row in rows]))
-        info = unknown_info(len(rows))
+        info = FilterInfo(nan, 1, len(rows))
         if not rows:
             return self.initial(), info
         numbers = [row.existence for row in rows], [row.mean for row in rows], [row.cov for row in rows]
@@ -98,11 +98,6 @@ class ProgramFilter:
             return LMB.from_bernoullis(labels, *numbers), info
         except InputError as error:
             self._program.refuse("states, covariances and existences", str(error))
-
-
-def unknown_info(num_labels: int) -> FilterInfo:
-    """Return the report of a step with nothing known except the number of labels."""
-    return FilterInfo(nan, 1, num_labels, 0.0, 0.0, 0, 0, 0, search_truncated=False, limit_reached=False)
 
 
 class _Row:

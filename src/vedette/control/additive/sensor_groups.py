@@ -19,7 +19,7 @@ from vedette.densities.tracks import places_of, single_gaussians, take_tracks
 from vedette.internal.probabilities import logit
 from vedette.kernels.base.types import Floats, Ints, Lmb
 from vedette.kernels.planning.ideal import EXPECTED, IDEAL, Decision, SampledTrajectories
-from vedette.kernels.planning.known_association import rows_without_scans
+from vedette.kernels.planning.known_changes import rows_without_scans
 from vedette.kernels.planning.reach import Belief, Paths, label_radii, predict_paths
 from vedette.models import SensorModel
 from vedette.platforms import Options

@@ -24,7 +24,7 @@ from vedette.kernels.planning.ascent import Cells
 from vedette.kernels.planning.bernoulli_rows import Table
 from vedette.kernels.planning.cells import cells_in_view
 from vedette.kernels.planning.expected_information import fill_expected_changes
-from vedette.kernels.planning.known_association import Entries, fill_changes
+from vedette.kernels.planning.known_changes import Entries, fill_changes
 from vedette.kernels.planning.reach import fill_reach, fill_within
 from vedette.models.arguments import provides
 from vedette.platforms import Options

@@ -12,6 +12,7 @@ from vedette.control.constraints.protocol import ConstraintContext, PerSensorCon
 from vedette.kernels.base.types import Bools, Floats
 from vedette.models import Region
 from vedette.models.arguments import float_array, reject
+from vedette.models.fields import Checked
 from vedette.models.region import warn_if_corners_in_degrees
 
 # m; distance from a fence to its zone, and width of the zone.
@@ -19,7 +20,7 @@ _EDGE, _BEYOND = 1e-6, 1e7
 
 
 @dataclass(frozen=True, slots=True)
-class StayInside(PerSensorConstraint):
+class StayInside(PerSensorConstraint, Checked):
     """Every moving platform stays inside a rectangle, its edge included, at all times of the horizon.
 
     Attributes:
@@ -33,10 +34,6 @@ class StayInside(PerSensorConstraint):
     name: ClassVar[str] = "stay_inside"
     needs_beliefs: ClassVar[bool] = False
     time_invariant = True
-
-    def __post_init__(self) -> None:
-        if not isinstance(self.region, Region):
-            raise reject("region", "a Region", self.region)
 
     @property
     def zone(self) -> tuple[Floats, ...]:

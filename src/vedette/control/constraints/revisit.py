@@ -13,7 +13,8 @@ from vedette.control.constraints.protocol import ConstraintContext, PerSensorCon
 from vedette.densities import as_lmb, track_moments
 from vedette.errors import InputError
 from vedette.kernels.base.types import Floats, Ints
-from vedette.models.arguments import float_array, positive, probability
+from vedette.models.arguments import float_array
+from vedette.models.fields import Positive, Probability, check_fields
 from vedette.models.measurement import wrap_angles
 from vedette.platforms.camera import POINTING, angle_beyond_view, is_camera, view_gap
 from vedette.platforms.patrolling import CLOCKS
@@ -34,9 +35,9 @@ class Revisit(PerSensorConstraint):
 
     Attributes:
         places: (num_places, 2) m, those of `Patrolling`. (): all targets.
-        radius: m, distance within which a platform is at a place, or a sensor has a target in view. A camera must also
-            have it in its field of view.
-        every: s.
+        radius: distance within which a platform is at a place, or a sensor has a target in view. A camera must also
+            have it in its field of view [m].
+        every: longest time from one visit of a place, or scan of a target, to the next [s].
         existence: minimum existence probability of the targets.
 
     Raises:
@@ -44,17 +45,15 @@ class Revisit(PerSensorConstraint):
     """
 
     places: Sequence[tuple[float, float]]
-    radius: float
-    every: float
-    existence: float = 0.5
+    radius: Positive
+    every: Positive
+    existence: Probability = 0.5
     name: ClassVar[str] = "revisit"
 
     def __post_init__(self) -> None:
         places = float_array("places", self.places, (None, 2)).tolist() if len(self.places) else ()
         object.__setattr__(self, "places", tuple(map(tuple, places)))
-        probability("existence", self.existence)
-        positive("radius", self.radius)
-        positive("every", self.every)
+        check_fields(self)
 
     @property
     def needs_beliefs(self) -> bool:

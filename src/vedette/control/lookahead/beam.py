@@ -11,11 +11,11 @@ import numpy as np
 from vedette.control.lookahead.courses import Sequence
 from vedette.control.lookahead.problem import JointSequence, SequenceProblem
 from vedette.control.search import tie_tolerance
-from vedette.models.arguments import dimension
+from vedette.models.fields import Checked, Count
 
 
 @dataclass(frozen=True, slots=True)
-class BeamSearch:
+class BeamSearch(Checked):
     """A search of one sensor at a time, with a beam of its best beginnings that grows decision by decision.
 
     The value of a beginning is that of the sequence that repeats its last action until the end. So the far future
@@ -29,10 +29,7 @@ class BeamSearch:
         beam_width: beginnings that are kept at each decision.
     """
 
-    beam_width: int = 8
-
-    def __post_init__(self) -> None:
-        dimension("beam_width", self.beam_width)
+    beam_width: Count = 8
 
     def search(self, problem: SequenceProblem, *, rng: np.random.Generator) -> None:
         """Search until nothing is better, or the budget is used up."""

@@ -30,7 +30,8 @@ from vedette.control.settings import MobileSensor, PlanningSettings
 from vedette.errors import NumericalError
 from vedette.fusion import Fusion
 from vedette.kernels.base.types import Floats
-from vedette.models.arguments import dimension, generator, instance, positive, probability, reject
+from vedette.models.arguments import generator, reject
+from vedette.models.fields import Count, Positive, Probability, check_fields
 from vedette.platforms import Options
 from vedette.tracking import State
 
@@ -69,10 +70,12 @@ class HorizonPlanner:
         sensors, fusion, settings, reward: as in `JointPlanner`. The horizon of the settings is that of one decision.
             Reward and fusion must be sums over labels. GLMB beliefs are planned on as LMBs, and plans say so.
         depth: number of decisions.
-        period: s from a decision to the next, a whole multiple of the settings' period. None: their horizon.
+        period: time from a decision to the next, a whole multiple of horizon_period. None: the horizon of a decision,
+            horizon_steps times horizon_period [s].
         search: which joint sequences are evaluated, where the budget is too small for all.
-        budget: maximum number of joint sequences evaluated.
-        discount: g in [0, 1]. None: only the end counts.
+        budget: maximum number of joint sequences evaluated for a decision.
+        discount: weight g of a decision's reward relative to that of the decision before. None: only the reward at
+            the end of the last horizon counts.
         constraints: limits on the sensors' courses, tested at every decision of a sequence: from where its courses
             begin to the end of its horizon, or to the next decision if that is later.
         notes: notes that every plan repeats.
@@ -85,11 +88,11 @@ class HorizonPlanner:
     fusion: Fusion
     settings: PlanningSettings = field(default_factory=PlanningSettings)
     reward: AnyReward = field(default_factory=ExpectedLossReward)
-    depth: int = 3
-    period: float | None = None
+    depth: Count = 3
+    period: Positive | None = None
     search: SequenceSearch = field(default_factory=BeamSearch)
-    budget: int = 2000
-    discount: float | None = 0.25
+    budget: Count = 2000
+    discount: Probability | None = 0.25
     constraints: tuple[Constraint, ...] = ()
     notes: tuple[str, ...] = ()
     name: ClassVar[str] = "lookahead"
@@ -97,14 +100,10 @@ class HorizonPlanner:
     def __post_init__(self) -> None:
         check_control_inputs(self)
         check_reward_inputs(self.fusion, self.reward, self.notes)
-        instance("search", self.search, SequenceSearch)
-        if dimension("depth", self.depth) > MOST_DECISIONS:
+        check_fields(self)
+        if self.depth > MOST_DECISIONS:
             raise reject("depth", f"at most {MOST_DECISIONS} decisions", self.depth)
-        dimension("budget", self.budget)
-        if self.discount is not None:
-            probability("discount", self.discount)
         if self.period is not None:
-            positive("period", self.period)
             steps = self.period / self.settings.horizon_period
             if round(steps) < 1 or abs(steps - round(steps)) > 1e-9 * steps:
                 multiple = f"a whole multiple of the horizon_period, {self.settings.horizon_period:g}"

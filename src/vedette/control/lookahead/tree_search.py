@@ -10,14 +10,14 @@ import numpy as np
 
 from vedette.control.lookahead.courses import Sequence
 from vedette.control.lookahead.problem import JointSequence, SequenceProblem
-from vedette.models.arguments import dimension, non_negative, one_of
+from vedette.models.fields import Checked, Count, NonNegative
 
 # Number of rounds without a new evaluation after which the search ends.
 _IDLE_ROUNDS = 50
 
 
 @dataclass(frozen=True, slots=True)
-class TreeSearch:
+class TreeSearch(Checked):
     """A search by upper confidence bounds on trees (Kocsis, Szepesvari 2006), for deterministic values.
 
     A node is a beginning: the courses of all sensors at the first decisions, and of the first sensors at the next one.
@@ -35,14 +35,9 @@ class TreeSearch:
         InputError: an exploration below 0, another rollout, a batch below 1.
     """
 
-    exploration: float = 0.3
+    exploration: NonNegative = 0.3
     rollout: Literal["random", "repeat_last"] = "random"
-    batch: int = 16
-
-    def __post_init__(self) -> None:
-        non_negative("exploration", self.exploration)
-        dimension("batch", self.batch)
-        one_of("rollout", self.rollout, ("random", "repeat_last"))
+    batch: Count = 16
 
     def search(self, problem: SequenceProblem, *, rng: np.random.Generator) -> None:
         """Search until the budget is used up, or all sequences are evaluated."""

@@ -104,10 +104,8 @@ def _name_maps(figure: Figure, panels: Any, pair: tuple[int, int], rewards: Mean
 
 
 def _draw_curves(axes: Axes, rewards: MeanRewards, sensors: Sequence[int], scene: Scene) -> None:
-    axes_of_sensors, styles = (
-        {sensor: action_axis(rewards.actions[sensor]) for sensor in sensors},
-        sensor_styles(sensors),
-    )
+    axes_of_sensors = {sensor: action_axis(rewards.actions[sensor]) for sensor in sensors}
+    styles = sensor_styles(sensors)
     one_axis = (
         len({own_axis.title() if own_axis.is_numeric else own_axis.labels for own_axis in axes_of_sensors.values()})
         == 1

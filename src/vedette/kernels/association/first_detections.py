@@ -20,17 +20,16 @@ from vedette.kernels.association.assignment import ABSENT, Options
 from vedette.kernels.association.gating import near_measurements
 from vedette.kernels.association.joined_rows import copy_entry
 from vedette.kernels.association.options import Sight, make_room, room_for_updated, sort_row, weigh_detection
-from vedette.kernels.association.predicted import Rows, expect_rows, log_or_minus_inf, make_rows
-from vedette.kernels.base.arrays import group_members
+from vedette.kernels.association.predicted import Rows, log_or_minus_inf, make_rows, rows_of_scan
+from vedette.kernels.base.arrays import counted_ints, group_members
 from vedette.kernels.base.compile import borrowing, kernel
-from vedette.kernels.base.types import Floats, Ints, Mixture, ScanInput, Sensor
-from vedette.kernels.gaussian.components import components_like, copy_component, copy_components
+from vedette.kernels.base.types import Floats, Ints, Mixture, ScanInput, Sensor, Tracks
+from vedette.kernels.gaussian.components import components_like, copy_component
 from vedette.kernels.gaussian.detection import moments_if_missed
 from vedette.kernels.gaussian.innovation import copy_innovation
 from vedette.kernels.gaussian.linalg import log_add
 from vedette.kernels.gaussian.marks import room_for_updated_marks
 from vedette.kernels.gaussian.relinearisation import make_pair_work
-from vedette.kernels.gaussian.scratch import make_scratch
 
 _LEAST_SHARE = math.log(1e-5)  # least share of a component of the intensity in a candidate's density
 # A measurement begins a label if that would have the least odds, or if no track takes it with at least the probability
@@ -64,14 +63,9 @@ def seen_intensity(intensity: Mixture, scan: ScanInput, sensor: Sensor) -> Rows:
 
     The rows are never absent.
     """
-    num, state_dim, meas_dim = len(intensity.log_weights), intensity.means.shape[1], len(sensor.periods)
-    rows = make_rows(num, num, intensity, meas_dim)
-    for c in range(num):
-        rows.labels[c, 0], rows.labels[c, 1] = 0, 0
-        rows.offsets[c + 1], rows.log_absent[c] = c + 1, -math.inf
-    copy_components(intensity, 0, num, rows.components, 0)
-    expect_rows(sensor, scan, rows, make_scratch(state_dim, meas_dim))
-    return rows
+    num = len(intensity.log_weights)
+    each = Tracks(np.zeros((num, 2), np.int64), counted_ints(num + 1), intensity)
+    return rows_of_scan(each, scan, None, sensor)
 
 
 @kernel

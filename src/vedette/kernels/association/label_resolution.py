@@ -20,11 +20,11 @@ from vedette.kernels.association.assignment import DualWork, Options, make_dual_
 from vedette.kernels.association.options import make_room
 from vedette.kernels.base.arrays import counted_ints, filled_ints
 from vedette.kernels.base.compile import borrowing, kernel
-from vedette.kernels.base.types import Floats, Glmb, Ints
+from vedette.kernels.base.types import Floats, Glmb, Ints, Mixture
 from vedette.kernels.gaussian.distances import pair_distances
 from vedette.kernels.gaussian.marks import no_marks
 from vedette.kernels.gaussian.mixtures import descending_order
-from vedette.kernels.gaussian.pooling import Moments, moments_of
+from vedette.kernels.gaussian.pooling import merged_mixtures
 
 # If two places fit a target equally well, it keeps its own label.
 _STAY = 1e-6
@@ -103,7 +103,7 @@ def _assign(hyp_tracks: Ints, labels: Ints, places: _Places, most: float, choice
 
 
 @kernel
-def _open_places(hyp_tracks: Ints, labels: Ints, places: _Places, moments: Moments, out: Ints) -> None:
+def _open_places(hyp_tracks: Ints, labels: Ints, places: _Places, moments: Mixture, out: Ints) -> None:
     """Open the new places in `out`, with the target's own label if it is free, otherwise with a free one."""
     means, covs = moments.means, moments.covs
     for turn in range(2):
@@ -143,7 +143,7 @@ def _resolve_factor(
         num = max(num, place + 1)
     if num < 2:
         return
-    moments = moments_of(glmb.tracks, low, high)
+    moments = merged_mixtures(glmb.tracks.components, glmb.tracks.offsets[low : high + 1])
     places = _Places(
         filled_ints(num, -1), filled_ints(num, -1), np.full((high - low, num), math.inf), filled_ints(high - low, -1)
     )

@@ -38,12 +38,6 @@ def marks_between(marks: Marks, first: int, last: int) -> Marks:
 
 
 @inlined
-def has_marks(marks: Marks) -> bool:
-    """Return True if a column is in use."""
-    return marks.log_class_probs.shape[1] > 0
-
-
-@inlined
 def copy_marks(marks: Marks, source: int, out: Marks, target: int) -> None:
     """Copy the marks of component `source` to place `target`, in the columns that both have."""
     for k in range(min(marks.log_class_probs.shape[1], out.log_class_probs.shape[1])):
@@ -126,13 +120,3 @@ def taken_marks(marks: Marks, places: Ints | slice) -> Marks:
 def joined_marks(marks: Iterable[Marks]) -> Marks:
     """The marks of all bundles, in their order."""
     return Marks(*map(np.concatenate, zip(*marks, strict=True)))
-
-
-def merged_runs(log_weights: Floats, offsets: Ints, marks: Marks) -> Marks:
-    """The marks of consecutive normalised mixtures, each merged into one component."""
-    num = len(offsets) - 1
-    if len(log_weights) == num or not marks.log_class_probs.shape[1]:
-        return Marks(*(column[:num].copy() for column in marks))
-    probs = np.exp(log_weights)[:, np.newaxis] * np.exp(marks.log_class_probs)
-    with np.errstate(divide="ignore"):
-        return Marks(np.asarray(np.log(np.add.reduceat(probs, offsets[:-1]))))

@@ -3,48 +3,41 @@
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
 
 import numpy as np
 
 from vedette.kernels.base.compile import borrowing, inlined, kernel
 from vedette.kernels.base.types import Floats, Ints, Mixture, Tracks
 from vedette.kernels.gaussian.components import (
+    components_between,
     components_like,
     copy_component,
-    copy_gaussian,
+    merge_all,
     merge_components,
     own_components,
 )
-from vedette.kernels.gaussian.mixtures import moment_match, require_gaussians
+from vedette.kernels.gaussian.linalg import log_sum
+from vedette.kernels.gaussian.mixtures import require_gaussians
 from vedette.kernels.gaussian.reduction import MixtureCaps, make_reduction_work, reduce_into
 
 
-class Moments(NamedTuple):
-    """Means and covariances of tracks."""
-
-    means: Floats  # (num_tracks, state_dim)
-    covs: Floats  # (num_tracks, state_dim, state_dim)
-
-
 @kernel
-def moments_of(tracks: Tracks, first: int, last: int) -> Moments:
-    """Return the moments of tracks `first:last`."""
-    components = tracks.components
-    dim = components.means.shape[1]
-    out = Moments(np.empty((last - first, dim)), np.empty((last - first, dim, dim)))
-    for i in range(last - first):
-        start, end = tracks.offsets[first + i], tracks.offsets[first + i + 1]
-        if end - start == 1:  # most tracks
-            copy_gaussian(components.means, components.covs, start, out.means, out.covs, i)
+def merged_mixtures(mixtures: Mixture, offsets: Ints) -> Mixture:
+    """The Gaussian of the moments of each mixture `offsets[i]:offsets[i + 1]`, with its weight and its marks merged.
+
+    Components of a mixture of weight 0 count alike. No mixture is empty.
+    """
+    num, largest = len(offsets) - 1, 0
+    for i in range(num):
+        largest = max(largest, offsets[i + 1] - offsets[i])
+    out, components, weights = components_like(mixtures, num), np.empty(largest, np.int64), np.empty(largest)
+    for i in range(num):
+        first, end = offsets[i], offsets[i + 1]
+        if end - first == 1:  # most tracks
+            copy_component(mixtures, first, out, i)
             continue
-        moment_match(
-            components.log_weights[start:end],
-            components.means[start:end],
-            components.covs[start:end],
-            out.means[i],
-            out.covs[i],
-        )
+        own = components_between(mixtures, first, end)
+        merge_all(own, end - first, components, weights, log_sum(own.log_weights), out, i)
     return out
 
 

@@ -1,14 +1,15 @@
-"""Prediction of a single Gaussian: the Chapman-Kolmogorov step of extended, unscented and cubature Kalman filters."""
+"""Prediction of Gaussians: the Chapman-Kolmogorov step of extended, unscented and cubature Kalman filters."""
 
 from __future__ import annotations
 
 import math
 
 from vedette.errors import ModelError
-from vedette.kernels.base.compile import borrowing, inlined
-from vedette.kernels.base.types import Floats, Motion
+from vedette.kernels.base.compile import borrowing, inlined, kernel
+from vedette.kernels.base.types import Floats, Mixture, Motion
+from vedette.kernels.gaussian.components import components_like, copy_component
 from vedette.kernels.gaussian.linalg import sandwich
-from vedette.kernels.gaussian.scratch import Scratch
+from vedette.kernels.gaussian.scratch import Scratch, make_scratch
 from vedette.kernels.gaussian.sigma_points import LINEARISED, fill_sigma_points, moments_of_images
 
 
@@ -57,3 +58,18 @@ def predict(
         # Said here, of the motion model, before a Cholesky factor fails for a reason nobody can guess.
         if out_cov[i, i] <= 0.0:
             raise ModelError("motion model: predicted covariance is not positive definite, as with indefinite noise")
+
+
+@kernel
+def predicted_intensity(intensity: Mixture, motion: Motion, dt: float) -> Mixture:
+    """Return the intensity after survival and motion over `dt` seconds, component by component."""
+    num, dim = intensity.means.shape
+    out, scratch = components_like(intensity, num), make_scratch(dim, 1)
+    for c in range(num):
+        survival = motion.prob_survival(intensity.means[c], dt, motion.survival_params)
+        if not 0.0 <= survival <= 1.0:
+            raise ModelError("survival model: probability is not in [0, 1]")
+        copy_component(intensity, c, out, c)
+        out.log_weights[c] += math.log(survival) if survival > 0.0 else -math.inf
+        predict(motion, dt, intensity.means[c], intensity.covs[c], out.means[c], out.covs[c], scratch)
+    return out

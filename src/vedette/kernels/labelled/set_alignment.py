@@ -76,11 +76,9 @@ def _marginal_labels(sets: Sets, sensor: int, num_groups: int, caps: MixtureCaps
     offsets, members = sets.hyps.hyp_offsets[low : high + 1] - start, sets.hyps.hyp_tracks[start:end]
     own = Glmb(sets.hyps.tracks, offsets, members, sets.hyps.hyp_log_weights[low:high])
     labels = increasing_labels(own)
-    firsts, ends, label_of = (
-        np.zeros(len(labels), np.int64),
-        np.zeros(len(labels), np.int64),
-        np.empty(end - start, np.int64),
-    )
+    firsts = np.zeros(len(labels), np.int64)
+    ends = np.zeros(len(labels), np.int64)
+    label_of = np.empty(end - start, np.int64)
     group_first, group_end = np.full(num_groups, -1, np.int64), np.zeros(num_groups, np.int64)
     for h in range(high - low):
         group = sets.group_of[low + h]

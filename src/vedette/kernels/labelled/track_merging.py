@@ -13,11 +13,11 @@ import numpy as np
 
 from vedette.kernels.base.arrays import counted_ints, filled_ints, group_members
 from vedette.kernels.base.compile import borrowing, kernel
-from vedette.kernels.base.types import Floats, Glmb, Ints, Tracks
+from vedette.kernels.base.types import Floats, Glmb, Ints, Mixture, Tracks
 from vedette.kernels.gaussian.distances import l1_bound
 from vedette.kernels.gaussian.linalg import cholesky, log_sum, solve_lower
 from vedette.kernels.gaussian.mixtures import descending_order
-from vedette.kernels.gaussian.pooling import Moments, moments_of, pooled_tracks
+from vedette.kernels.gaussian.pooling import merged_mixtures, pooled_tracks
 from vedette.kernels.gaussian.reduction import MixtureCaps
 from vedette.kernels.labelled.groups import group_log_sums
 from vedette.kernels.labelled.splitting import Choices, group_choices
@@ -70,7 +70,7 @@ def _versions_of(labels: Ints, step: int, index: int, weights: Floats, versions:
 
 
 @borrowing
-def _write_diagonals(count: int, moments: Moments, work: _Work) -> None:
+def _write_diagonals(count: int, moments: Mixture, work: _Work) -> None:
     """Write the means, inverse variances and log variances of the first `count` versions."""
     for k in range(count):
         version = work.versions[k]
@@ -103,7 +103,7 @@ def _likeliest_heavier(k: int, weights: Floats, work: _Work) -> int:
 
 
 @borrowing
-def _find_pairs(count: int, weights: Floats, moments: Moments, distance: float, work: _Work, pairs: _Pairs) -> None:
+def _find_pairs(count: int, weights: Floats, moments: Mixture, distance: float, work: _Work, pairs: _Pairs) -> None:
     """Find the pairs of one label, among the first `count` of `work.versions`.
 
     Merging two versions of weights v and w into their mixture changes the density by at most 2 v w / (v + w) times the
@@ -144,7 +144,7 @@ def _leaders(glmb: Glmb, labels: Ints, weights: Floats, distance: float, max_err
     num, leader = len(weights), counted_ints(len(weights))
     if len(labels) == num:  # every label has one version
         return leader, num
-    moments = moments_of(glmb.tracks, 0, num)
+    moments = merged_mixtures(glmb.tracks.components, glmb.tracks.offsets)
     work = _make_work(num, moments.means.shape[1])
     pairs = _Pairs(np.full(num, math.inf), filled_ints(num, -1))
     for k in range(len(labels)):

@@ -1,8 +1,7 @@
 """Models at many states side by side: built-in ones in loops that the compiler vectorises, others state by state.
 
 A model is a function of one state. For the built-in models most used in decisions, the same formulas are implemented
-here over an index of states. `ModelForms` selects them for a decision. All arrays have the states along their last
-axis. Each loop writes one array, because the compiler does not vectorise loops over many arrays that might overlap.
+here over an index of states. `ModelForms` selects them for a decision (docs/decisions/0033). Arrays are as in `lanes`.
 """
 
 from __future__ import annotations
@@ -17,6 +16,7 @@ from vedette.kernels.base.elementary import Bits, directions, exponentials, make
 from vedette.kernels.base.types import Floats, Sensor
 from vedette.kernels.gaussian.detection import AT_CENTRE, checked, detection_probability
 from vedette.kernels.gaussian.scratch import Scratch
+from vedette.kernels.planning.lanes import copy_rows, place, put_rows, put_state, set_row, take_matrix, take_state
 
 ANY = 0  # a function of one state
 
@@ -53,28 +53,6 @@ def make_offsets(room: int) -> Offsets:
     return Offsets(np.empty(room), np.empty(room), np.empty(room), np.empty(room), make_bits(room), make_bits(room))
 
 
-@inlined
-def place(row: int, column: int) -> int:
-    """Return the index of an entry in the lower triangle of a matrix, row by row."""
-    return row * (row + 1) // 2 + column
-
-
-@inlined
-def take_state(states: Floats, s: int, out: Floats) -> None:
-    """Write out (state_dim,) = the state at index s of (state_dim, room)."""
-    for j in range(len(out)):
-        out[j] = states[j, s]
-
-
-@inlined
-def take_matrix(lower: Floats, s: int, out: Floats) -> None:
-    """Write out = the symmetric matrix at index s of lower triangles."""
-    for i in range(out.shape[0]):
-        for j in range(i + 1):
-            out[i, j] = lower[place(i, j), s]
-            out[j, i] = out[i, j]
-
-
 @borrowing
 def find_offsets(pose: Floats, states: Floats, num: int, out: Offsets) -> None:
     """Write the offsets of the first `num` states (state_dim, room) from the pose."""
@@ -101,17 +79,13 @@ def fill_measurements(
         for s in range(num):
             ranges[s] = offsets.distances[s]
     elif form == POSITION:
-        for a in range(2):
-            given, written = states[a], out[a]
-            for s in range(num):
-                written[s] = given[s]
+        copy_rows(states, num, out)
     else:
         state, measured = scratch.points[0], scratch.residual
         for s in range(num):
             take_state(states, s, state)
             sensor.measurement(state, pose, sensor.measurement_params, measured)
-            for a in range(len(measured)):
-                out[a, s] = measured[a]
+            put_state(measured, s, out)
 
 
 @borrowing
@@ -135,17 +109,13 @@ def fill_jacobians(
     elif form == POSITION:
         for a in range(2):
             for j in range(2):
-                entries = out[a * dim + j]
-                for s in range(num):
-                    entries[s] = 1.0 if a == j else 0.0
+                set_row(1.0 if a == j else 0.0, num, out[a * dim + j])
     else:
         state, jacobian = scratch.points[0], scratch.measurement_jacobian
         for s in range(num):
             take_state(states, s, state)
             sensor.measurement_jacobian(state, pose, sensor.measurement_params, jacobian)
-            for a in range(jacobian.shape[0]):
-                for j in range(dim):
-                    out[a * dim + j, s] = jacobian[a, j]
+            put_rows(jacobian, s, out)
 
 
 @inlined
@@ -161,22 +131,19 @@ def fill_noise(
     """Write out (meas_dim (meas_dim + 1) / 2, room): lower triangles of the measurement noise, made symmetric."""
     params, noise = sensor.noise_params, scratch.measurement_noise
     if form == GROWING:
-        bearings, between, ranges, squares, distances = out[0], out[1], out[2], offsets.squares, offsets.distances
+        bearings, ranges, squares, distances = out[0], out[2], offsets.squares, offsets.distances
         near_range, far_range, near_bearing, far_bearing = params[0], params[1], params[2], params[3]
         for s in range(num):
             std = near_bearing + far_bearing * distances[s]
             bearings[s] = std * std
-        for s in range(num):
-            between[s] = 0.0
+        set_row(0.0, num, out[1])
         for s in range(num):
             std = near_range + far_range * squares[s]
             ranges[s] = std * std
     elif form == CONSTANT:
         for a in range(noise.shape[0]):
             for b in range(a + 1):
-                entries, entry = out[place(a, b)], params[a] * params[a] if a == b else 0.0
-                for s in range(num):
-                    entries[s] = entry
+                set_row(params[a] * params[a] if a == b else 0.0, num, out[place(a, b)])
     else:
         state = scratch.points[0]
         for s in range(num):
@@ -191,8 +158,7 @@ def fill_noise(
 def _detect_by_form(sensor: Sensor, forms: ModelForms, offsets: Offsets, num: int, out: Floats) -> None:
     # Beyond the largest exponent the result is that of the limit, up to 1e-304.
     if forms.detection == SAME:
-        for s in range(num):
-            out[s] = sensor.detection_params[0]
+        set_row(sensor.detection_params[0], num, out)
     elif forms.detection == GAUSSIAN:
         spread = sensor.detection_params[0] * sensor.detection_params[0]
         for s in range(num):
@@ -247,14 +213,11 @@ def fill_detection_of_gaussians(
 
     means: (state_dim, room). covs: (state_dim (state_dim + 1) / 2, room) lower triangles.
     """
-    if forms.detection != ANY and sensor.detection_rule == AT_CENTRE:
-        _detect_by_form(sensor, forms, offsets, num, out)
+    if sensor.detection_rule == AT_CENTRE:
+        fill_detection(sensor, forms, pose, means, offsets, num, scratch, out)
         return
     mean, cov = scratch.points[1], scratch.factor
     for s in range(num):
         take_state(means, s, mean)
-        if sensor.detection_rule == AT_CENTRE:
-            out[s] = checked(sensor.prob_detection(mean, pose, sensor.detection_params))
-        else:
-            take_matrix(covs, s, cov)
-            out[s] = detection_probability(sensor, pose, mean, cov, scratch.points[0])
+        take_matrix(covs, s, cov)
+        out[s] = detection_probability(sensor, pose, mean, cov, scratch.points[0])

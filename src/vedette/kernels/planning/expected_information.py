@@ -27,7 +27,7 @@ from vedette.kernels.gaussian.sigma_points import LINEARISED, SWITCHED
 from vedette.kernels.planning.batched_models import Offsets, fill_detection, find_offsets, make_offsets
 from vedette.kernels.planning.bernoulli_rows import log_miss
 from vedette.kernels.planning.ideal import Decision
-from vedette.kernels.planning.known_association import Entries
+from vedette.kernels.planning.known_changes import Entries
 from vedette.kernels.planning.reach import Belief, is_beyond
 
 
@@ -198,7 +198,7 @@ def fill_expected_changes(
     last: int,
     changes: Floats,
 ) -> None:
-    """Write changes (num_entries, bernoulli_size, 1) for courses `first:last`. See `known_association.fill_changes`.
+    """Write changes (num_entries, bernoulli_size, 1) for courses `first:last`. See `known_changes.fill_changes`.
 
     They are zero for a label whose detection probability is below `least` at every step, for example beyond `reach`, m.
     P_D is that of the prediction, even if earlier scans of the horizon are expected to have reduced its covariance.

@@ -16,48 +16,30 @@ from typing import NamedTuple
 
 import numpy as np
 
-from vedette.errors import NumericalError
 from vedette.kernels.association.options import log_clutter_at
 from vedette.kernels.base.compile import borrowing, inlined, kernel
 from vedette.kernels.base.elementary import exponentials, logs, logs_of_one_and
-from vedette.kernels.base.types import Bools, Floats, Ints
-from vedette.kernels.gaussian.information import to_information
+from vedette.kernels.base.types import Bools, Floats
 from vedette.kernels.gaussian.scratch import wrap
-from vedette.kernels.planning.batched_ekf import (
+from vedette.kernels.planning.batched_innovation import expect_batch, relinearise_batch
+from vedette.kernels.planning.batched_models import fill_detection, fill_measurements, find_offsets
+from vedette.kernels.planning.batched_prediction import (
     BatchedGaussians,
     BatchWork,
-    expect_batch,
     make_batch,
     make_batch_work,
     predict_batch,
-    relinearise_batch,
 )
-from vedette.kernels.planning.batched_models import (
-    fill_detection,
-    fill_measurements,
-    find_offsets,
-    place,
-    take_matrix,
-    take_state,
-)
-from vedette.kernels.planning.bernoulli_rows import ALL_BUT_CERTAIN, LEAST_MISS, bernoulli_size
+from vedette.kernels.planning.bernoulli_rows import LEAST_MISS
 from vedette.kernels.planning.ideal import IDEAL, SAMPLED, Decision, add_noise
-from vedette.kernels.planning.pseudo_lmb import LmbResults
+from vedette.kernels.planning.lanes import copy_rows, place, put_state, set_row, subtract_product, take_state
 from vedette.kernels.planning.reach import Belief
 
 # Samples followed at a time: their numbers stay in the fastest cache.
-_MOST_LANES = 64
+MOST_LANES = 64
 
 # Upper limit of the log likelihood relative to a miss: its exponential is a double, and far beyond 1e16.
 _LARGEST_EXPONENT = 600.0
-
-
-class Entries(NamedTuple):
-    """The sensor's own labels that each of its courses reaches."""
-
-    first: Ints  # (num_courses,) first entry of each course
-    last: Ints  # (num_courses,) the entry after the last of each course
-    own: Ints  # (num_entries,) index among the sensor's labels
 
 
 class Followed(NamedTuple):
@@ -84,13 +66,13 @@ class Work(NamedTuple):
 
 
 @kernel
-def _make_followed(dim: int, room: int) -> Followed:
+def make_followed(dim: int, room: int) -> Followed:
     covs = np.empty((place(dim, 0), room))
     return Followed(np.empty((dim, room)), covs, np.empty(room), np.empty(room), np.empty(room, np.bool_))
 
 
 @kernel
-def _make_work(dim: int, meas_dim: int, room: int) -> Work:
+def make_follow_work(dim: int, meas_dim: int, room: int) -> Work:
     return Work(
         make_batch(dim, meas_dim, room),
         make_batch_work(dim, meas_dim, room),
@@ -109,12 +91,8 @@ def _take_path(belief: Belief, label: int, step: int, num: int, batch: BatchedGa
     mean, cov = belief.paths.means[label, step], belief.paths.covs[label, step]
     for i in range(len(mean)):
         for j in range(i + 1):
-            entries = batch.covs[place(i, j)]
-            for s in range(num):
-                entries[s] = cov[i, j]
-        entries = batch.means[i]
-        for s in range(num):
-            entries[s] = mean[i]
+            set_row(cov[i, j], num, batch.covs[place(i, j)])
+        set_row(mean[i], num, batch.means[i])
 
 
 @borrowing
@@ -148,8 +126,7 @@ def _detect(
                 take_state(targets, s, scratch.points[0])
                 normals = futures.normals[step, belief.targets[label, first + s]]
                 add_noise(sensor, scratch.points[0], pose, normals, scratch, scratch.residual)
-                for a in range(len(scratch.residual)):
-                    work.measurements[a, s] = scratch.residual[a]
+                put_state(scratch.residual, s, work.measurements)
     return count
 
 
@@ -183,9 +160,7 @@ def _whiten(decision: Decision, num: int, work: Work) -> None:
                 for s in range(num):
                     residuals[s] = residuals[s] if work.own.bends[s] else wrap(residuals[s], 2.0 * half)
         for k in range(a):
-            factors, others = batch.factor[place(a, k)], work.measurements[k]
-            for s in range(num):
-                residuals[s] -= factors[s] * others[s]
+            subtract_product(batch.factor[place(a, k)], work.measurements[k], num, residuals)
         divisors = batch.factor[place(a, a)]
         for s in range(num):
             residuals[s] /= divisors[s]
@@ -216,38 +191,24 @@ def _update_odds(num: int, work: Work, out: Followed) -> None:
 
 @inlined
 def _update(num: int, work: Work, out: Followed) -> None:
-    """Write updated means and covariances of the detected samples, and predicted ones of the others."""
+    """Update the predicted means and covariances of the detected samples."""
     batch, seen, dim = work.batch, work.is_seen, out.means.shape[0]
     for i in range(dim):
-        given, means = batch.means[i], out.means[i]
-        for s in range(num):
-            means[s] = given[s]
+        means = out.means[i]
         for a in range(batch.predicted.shape[0]):
             whitened, cross = work.measurements[a], batch.whitened_cross[a * dim + i]
             for s in range(num):
                 means[s] += cross[s] * whitened[s] if seen[s] else 0.0
     for k in range(out.covs.shape[0]):
-        predicted, updated, covs = batch.covs[k], batch.posterior[k], out.covs[k]
+        updated, covs = batch.posterior[k], out.covs[k]
         for s in range(num):
-            covs[s] = updated[s] if seen[s] else predicted[s]
+            covs[s] = updated[s] if seen[s] else covs[s]
     for s in range(num):
         out.is_measured[s] |= seen[s]
 
 
 @borrowing
-def _keep_predicted(num: int, batch: BatchedGaussians, out: Followed) -> None:
-    for i in range(out.means.shape[0]):
-        given, means = batch.means[i], out.means[i]
-        for s in range(num):
-            means[s] = given[s]
-    for k in range(out.covs.shape[0]):
-        given, covs = batch.covs[k], out.covs[k]
-        for s in range(num):
-            covs[s] = given[s]
-
-
-@borrowing
-def _follow(
+def follow(
     belief: Belief, decision: Decision, course: int, label: int, first: int, num: int, work: Work, out: Followed
 ) -> None:
     """Follow a label over a course, with `num` samples from `first` on."""
@@ -262,8 +223,9 @@ def _follow(
             _take_path(belief, label, step, num, batch)
         else:
             predict_batch(decision.motion, forms, horizon.dt, out.means, out.covs, num, batch, own)
+        copy_rows(batch.means, num, out.means)
+        copy_rows(batch.covs, num, out.covs)
         if not horizon.scans[course, step]:
-            _keep_predicted(num, batch, out)
             continue
         expect_batch(sensor, forms, pose, num, batch, own)
         for s in range(num):
@@ -279,86 +241,3 @@ def _follow(
             _update_odds(num, work, out)
             _update(num, work, out)
             is_path = False
-        else:
-            _keep_predicted(num, batch, out)
-
-
-@kernel
-def rows_without_scans(means: Floats, covs: Floats, logits: Floats, references: Floats) -> Floats:
-    """Return Bernoulli rows (num, bernoulli_size) of labels with one Gaussian each. Their logits are limited."""
-    num, dim = means.shape
-    rows, factor, inverse = np.empty((num, bernoulli_size(dim))), np.empty((dim, dim)), np.empty((dim, dim))
-    for i in range(num):
-        if not to_information(means[i], covs[i], references[i], 1.0, rows[i], factor, inverse):
-            raise NumericalError("prediction: covariance of a track is not positive definite")
-        rows[i, -2] = min(max(logits[i], -ALL_BUT_CERTAIN), ALL_BUT_CERTAIN)
-        rows[i, -1] = 0.0
-    return rows
-
-
-@borrowing
-def _write_changes(
-    found: Followed, first: int, num: int, reference: Floats, base: Floats, own: BatchWork, row: Floats, changes: Floats
-) -> None:
-    """Write changes (bernoulli_size, num_samples) of a label, for `num` samples from `first` on."""
-    size = len(base)
-    for s in range(num):
-        for k in range(size - 2):
-            row[k] = 0.0
-        if found.is_measured[s]:
-            take_state(found.means, s, own.mean)
-            take_matrix(found.covs, s, own.cov)
-            if not to_information(own.mean, own.cov, reference, 1.0, row, own.out_cov, own.scratch.product):
-                raise NumericalError("pseudo-update: covariance of a track is not positive definite")
-            for k in range(size - 2):
-                row[k] -= base[k]
-        for k in range(size - 2):
-            changes[k, first + s] = row[k]
-    for s in range(num):
-        changes[size - 2, first + s], changes[size - 1, first + s] = found.log_odds[s], found.log_miss[s]
-
-
-@kernel
-def fill_changes(
-    belief: Belief,
-    decision: Decision,
-    entries: Entries,
-    references: Floats,
-    bases: Floats,
-    first: int,
-    last: int,
-    changes: Floats,
-) -> None:
-    """Write changes (num_entries, bernoulli_size, num_samples) of Bernoulli rows, for courses `first:last` of a sensor.
-
-    references: (num_labels, state_dim) reference points of the rows. bases: (num_labels, bernoulli_size) the sensor's
-    rows without scans. Both in the order of the sensor's own labels.
-    """
-    dim, meas_dim, num_samples = references.shape[1], len(decision.sensor.periods), belief.targets.shape[1]
-    room = min(num_samples, _MOST_LANES)
-    work, found, row = _make_work(dim, meas_dim, room), _make_followed(dim, room), np.empty(bases.shape[1])
-    for course in range(first, last):
-        for entry in range(entries.first[course], entries.last[course]):
-            label = entries.own[entry]
-            for start in range(0, num_samples, _MOST_LANES):
-                num = min(_MOST_LANES, num_samples - start)
-                _follow(belief, decision, course, label, start, num, work, found)
-                _write_changes(found, start, num, references[label], bases[label], work.own, row, changes[entry])
-
-
-@kernel
-def pseudo_update_known(belief: Belief, decision: Decision, first: int, last: int, results: LmbResults) -> None:
-    """Write densities of courses `first:last` of one sensor for every sample: case `course * num_samples + sample`."""
-    tracks, num_samples = belief.prior.tracks, belief.targets.shape[1]
-    dim, room = tracks.components.means.shape[1], min(num_samples, _MOST_LANES)
-    work, found = _make_work(dim, len(decision.sensor.periods), room), _make_followed(dim, room)
-    for course in range(first, last):
-        for label in range(len(tracks.labels)):
-            for start in range(0, num_samples, _MOST_LANES):
-                num = min(_MOST_LANES, num_samples - start)
-                _follow(belief, decision, course, label, start, num, work, found)
-                for s in range(num):
-                    case = course * num_samples + start + s
-                    results.logits[case, label] = belief.prior.existence_logit[label] + found.log_odds[s]
-                    take_state(found.means, s, results.means[case, label])
-                    take_matrix(found.covs, s, results.covs[case, label])

@@ -93,11 +93,9 @@ def _power_integral(valuation: Valuation, label: int, e: int, work: ValueWork, o
         for s in range(num_samples):
             entries[s] = a * prior[k] + power * given[s]
     integrate_rows(joint, dim, work.integrals)
-    exponents, rest, logits = (
-        work.integrals.exponents,
-        joint[size - 4],
-        total[size - 2],
-    )
+    exponents = work.integrals.exponents
+    rest = joint[size - 4]
+    logits = total[size - 2]
     constant = a * prior[size - 2] + (a + b - 1.0) * valuation.log_volume - 0.5 * dim * math.log(b / power)
     for s in range(num_samples):
         exponents[s] += constant + b * logits[s] - 0.5 * (b - power) * rest[s]

@@ -19,16 +19,14 @@ from vedette.kernels.association.gating import Near, all_measurements
 from vedette.kernels.association.marginals import Association, fill_marginals
 from vedette.kernels.association.options import make_options, view_options, weigh_options
 from vedette.kernels.association.predicted import Rows, leave_unseen, make_rows, predict_rows
-from vedette.kernels.base.arrays import counted_ints
 from vedette.kernels.base.compile import borrowing, kernel
-from vedette.kernels.base.types import Floats, Ints, Lmb, Measurements, ScanInput, Tracks
-from vedette.kernels.gaussian.components import copy_gaussian, make_components
+from vedette.kernels.base.types import Floats, Ints, Lmb, Measurements, Mixture, ScanInput, Tracks
+from vedette.kernels.gaussian.components import copy_gaussian, make_components, merge_all
 from vedette.kernels.gaussian.marks import no_marks
 from vedette.kernels.gaussian.relinearisation import PairWork, make_pair_work
 from vedette.kernels.gaussian.row_noise import bare_measurements, first_measurements
 from vedette.kernels.planning.ideal import Decision, ideal_scan, most_targets
-from vedette.kernels.steps.lmb import fill_existence, weigh_by_existence
-from vedette.kernels.steps.matching import MixtureRoom, make_mixture, match_rows
+from vedette.kernels.steps.lmb import fill_existence, weigh_by_existence, write_mixture
 
 
 class LmbResults(NamedTuple):
@@ -50,10 +48,10 @@ class LmbWork(NamedTuple):
     near: Near  # every measurement with every row: ideal scans are small
     options: Options
     marginals: Floats  # (num_options,)
-    clusters: MarginalWork
     belief: Lmb  # after the latest step, one Gaussian per label
-    all_rows: Ints  # 0, 1, 2, ...: all rows are kept
-    mixture: MixtureRoom  # of one row
+    wide: Mixture  # of one row over its options
+    chosen: Ints  # (num,) the components of `wide`
+    weights: Floats  # (num,) their linear weights
 
 
 @kernel
@@ -73,28 +71,10 @@ def _make_work(prior: Lmb, meas_dim: int, most_measurements: int) -> LmbWork:
         all_measurements(),
         options,
         np.empty(len(options.columns)),
-        make_marginal_work(num, most_measurements),
         Lmb(tracks, np.empty(num)),
-        counted_ints(num),
-        make_mixture(most_measurements + 1, dim),
-    )
-
-
-@kernel
-def _grown_work(work: LmbWork) -> LmbWork:
-    return LmbWork(
-        work.pair,
-        work.measurements,
-        work.log_clutter,
-        work.first_rows,
-        work.rows,
-        work.near,
-        work.options,
-        work.marginals,
-        grown_marginal_work(work.clusters),
-        work.belief,
-        work.all_rows,
-        work.mixture,
+        make_components(most_measurements + 1, dim, no_marks()),
+        np.empty(most_measurements + 1, np.int64),
+        np.empty(most_measurements + 1),
     )
 
 
@@ -107,8 +87,9 @@ def _update_cases(
     last: int,
     results: LmbResults,
     work: LmbWork,
+    clusters: MarginalWork,
 ) -> int:
-    """Update cases `first:last`. Returns `last`, or the case before which `work` must be grown."""
+    """Update cases `first:last`. Returns `last`, or the case before which `clusters` must be grown."""
     sensor, horizon, caps, belief = decision.sensor, decision.horizon, decision.truncation, work.belief
     num_samples, prepared, updated = len(decision.futures.offsets) - 1, -1, belief.tracks.components
     for case in range(first, last):
@@ -127,7 +108,7 @@ def _update_cases(
             prepared = action
             options = view_options(work.options, len(rows.log_absent), num)
             weigh_options(rows, work.near, scan, sensor, caps, work.log_clutter, work.pair, options)
-            sums, has_room = fill_marginals(options, caps.search, association, work.clusters, work.marginals)
+            sums, has_room = fill_marginals(options, caps.search, association, clusters, work.marginals)
             if not has_room:
                 return case
             if sums.log_total == -math.inf:
@@ -135,7 +116,9 @@ def _update_cases(
                     "pseudo-update: no association has positive weight; do the models forbid the ideal scan?"
                 )
             fill_existence(options, work.marginals, belief.existence_logit)
-            match_rows(work.all_rows, rows, options, work.marginals, work.mixture, updated.means, updated.covs)
+            for row in range(len(belief.existence_logit)):
+                width = write_mixture(row, rows, options, work.marginals, work.wide)
+                merge_all(work.wide, width, work.chosen, work.weights, 0.0, updated, row)
         for i in range(len(belief.existence_logit)):
             results.logits[case, i] = belief.existence_logit[i]
             copy_gaussian(updated.means, updated.covs, i, results.means[case], results.covs[case], i)
@@ -150,8 +133,10 @@ def pseudo_update_lmb(
 
     prior: one Gaussian per track. association: used instead of the sums over clusters.
     """
-    work = _make_work(prior, len(decision.sensor.periods), most_targets(decision.futures))
+    most_measurements = most_targets(decision.futures)
+    work = _make_work(prior, len(decision.sensor.periods), most_measurements)
+    clusters = make_marginal_work(len(prior.tracks.labels), most_measurements)
     while first < last:
-        first = _update_cases(prior, decision, association, first, last, results, work)
+        first = _update_cases(prior, decision, association, first, last, results, work, clusters)
         if first < last:
-            work = _grown_work(work)
+            clusters = grown_marginal_work(clusters)

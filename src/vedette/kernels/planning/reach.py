@@ -35,10 +35,8 @@ class Belief(NamedTuple):
 def predict_paths(motion: Motion, dt: float, num_steps: int, means: Floats, covs: Floats) -> Paths:
     """Return the Gaussians of means (num, state_dim) after each of `num_steps` steps, without births or deaths."""
     num, dim = means.shape
-    scratch, paths = (
-        make_scratch(dim, dim),
-        Paths(np.empty((num, num_steps, dim)), np.empty((num, num_steps, dim, dim))),
-    )
+    scratch = make_scratch(dim, dim)
+    paths = Paths(np.empty((num, num_steps, dim)), np.empty((num, num_steps, dim, dim)))
     for i in range(num):
         for h in range(num_steps):
             mean = means[i] if h == 0 else paths.means[i, h - 1]

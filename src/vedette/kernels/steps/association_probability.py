@@ -11,9 +11,7 @@ from vedette.kernels.association.predicted import expect_rows, standing_rows
 from vedette.kernels.association.truncation import Truncation
 from vedette.kernels.base.compile import kernel
 from vedette.kernels.base.types import Floats, Lmb, ScanInput, Sensor
-from vedette.kernels.gaussian.mixtures import descending_order
 from vedette.kernels.gaussian.scratch import make_scratch
-from vedette.kernels.labelled.births import BirthsOfMeasurements, births_of_measurements
 from vedette.kernels.steps.field_of_view import in_view, marked
 from vedette.kernels.steps.lmb import weigh_by_existence
 
@@ -36,23 +34,3 @@ def prob_explained(belief: Lmb, scan: ScanInput, sensor: Sensor, truncation: Tru
     for j in range(len(odds)):
         odds[j] = odds[j] / (1.0 + odds[j]) if odds[j] < math.inf else 1.0
     return odds
-
-
-@kernel
-def births_unexplained(
-    belief: Lmb,
-    scan: ScanInput,
-    states: Floats,
-    sensor: Sensor,
-    truncation: Truncation,
-    least_unexplained: float,
-    begin: BirthsOfMeasurements,
-) -> Lmb:
-    """Return births at the measurements of one sensor that tracks do not surely explain, least explained first.
-
-    states: (num_measurements, state_dim) at rest where each was taken.
-    """
-    unexplained = 1.0 - prob_explained(belief, scan, sensor, truncation)
-    order = descending_order(unexplained)
-    free = order[unexplained[order] > least_unexplained]
-    return births_of_measurements(states[free], unexplained[free], begin)

@@ -24,11 +24,9 @@ from vedette.kernels.base.compile import borrowing, inlined, kernel
 from vedette.kernels.base.types import Floats, Ints, Lmb, Mixture, Motion, ScanInput, Sensor, Tracks
 from vedette.kernels.gaussian.components import components_between, components_like, copy_component
 from vedette.kernels.gaussian.linalg import log_add, normalise_logs
-from vedette.kernels.gaussian.marks import has_marks
 from vedette.kernels.gaussian.mixtures import descending_order, require_gaussians
 from vedette.kernels.gaussian.reduction import MixtureCaps, ReductionWork, make_reduction_work, reduce_into
 from vedette.kernels.steps.assembly import write_updated
-from vedette.kernels.steps.matching import make_mixture, match_rows
 
 
 class Reduction(NamedTuple):
@@ -116,21 +114,6 @@ def _most_components(kept: Ints, rows: Rows, options: Options) -> tuple[int, int
     return widest, total
 
 
-@kernel
-def _matched_tracks(kept: Ints, rows: Rows, options: Options, marginals: Floats) -> Tracks:
-    """Return one Gaussian for each kept row, faster than `_reduced_tracks`, which also has marks."""
-    num, dim = len(kept), rows.components.means.shape[1]
-    widest, _ = _most_components(kept, rows, options)
-    labels, offsets = np.empty((num, 2), np.int64), np.zeros(num + 1, np.int64)
-    out = components_like(rows.components, num)
-    for i in range(num):
-        out.log_weights[i] = 0.0
-        labels[i, 0], labels[i, 1] = rows.labels[kept[i], 0], rows.labels[kept[i], 1]
-        offsets[i + 1] = i + 1
-    match_rows(kept, rows, options, marginals, make_mixture(widest, dim), out.means, out.covs)
-    return Tracks(labels, offsets, out)
-
-
 @borrowing
 def write_mixture(row: int, rows: Rows, options: Options, marginals: Floats, wide: Mixture) -> int:
     """Write a row's components over all its options except absence, weighted by their probabilities.
@@ -205,10 +188,7 @@ def step_lmb(
     logits = np.empty(len(rows.log_absent))
     fill_existence(options, marginals, logits)
     kept, dropped = labels_to_keep(logits, reduction)
-    if reduction.mixture.max_components == 1 and not has_marks(rows.components.marks):
-        tracks = _matched_tracks(kept, rows, options, marginals)
-    else:
-        tracks = _reduced_tracks(kept, rows, options, marginals, reduction.mixture)
+    tracks = _reduced_tracks(kept, rows, options, marginals, reduction.mixture)
     require_gaussians(tracks.components.means, tracks.components.covs)
     kept_logits = np.empty(len(kept))
     for i in range(len(kept)):

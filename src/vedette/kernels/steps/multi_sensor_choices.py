@@ -7,6 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from vedette.kernels.association.clusters import root_of
 from vedette.kernels.base.arrays import filled_ints
 from vedette.kernels.base.compile import inlined, kernel
 from vedette.kernels.base.types import Floats, Ints
@@ -42,13 +43,6 @@ class Classes(NamedTuple):
     alive: Ints
 
 
-@inlined
-def _root(leaders: Ints, track: int) -> int:
-    while leaders[track] != track:
-        track = leaders[track]
-    return track
-
-
 @kernel
 def find_clusters(choices: Choices, num_columns: int) -> tuple[Ints, Ints]:
     """Return the leader of each track's cluster, and the contested measurements.
@@ -57,11 +51,9 @@ def find_clusters(choices: Choices, num_columns: int) -> tuple[Ints, Ints]:
     contested: (num_columns,) 1 if more than one track may take the measurement.
     """
     num_tracks = len(choices.log_absent)
-    leaders, owners, contested = (
-        np.empty(num_tracks, np.int64),
-        filled_ints(num_columns, -1),
-        filled_ints(num_columns, 0),
-    )
+    leaders = np.empty(num_tracks, np.int64)
+    owners = filled_ints(num_columns, -1)
+    contested = filled_ints(num_columns, 0)
     for track in range(num_tracks):
         leaders[track] = track
         for choice in range(choices.offsets[track], choices.offsets[track + 1]):
@@ -71,7 +63,7 @@ def find_clusters(choices: Choices, num_columns: int) -> tuple[Ints, Ints]:
                     continue
                 if owners[column] >= 0:
                     contested[column] = 1
-                    a, b = _root(leaders, owners[column]), _root(leaders, track)
+                    a, b = root_of(leaders, owners[column]), root_of(leaders, track)
                     leaders[max(a, b)] = min(a, b)
                 owners[column] = track
     return leaders, contested
@@ -81,7 +73,7 @@ def find_clusters(choices: Choices, num_columns: int) -> tuple[Ints, Ints]:
 def members_of(leaders: Ints, leader: int) -> Ints:
     members, count = np.empty(len(leaders) - leader, np.int64), 0
     for track in range(leader, len(leaders)):
-        if _root(leaders, track) == leader:
+        if root_of(leaders, track) == leader:
             members[count] = track
             count += 1
     return members[:count]
@@ -108,11 +100,9 @@ def _order_members(choices: Choices, members: Ints, bit_of: Ints, num_bits: int)
     An open measurement may be taken both by earlier and by later members.
     """
     num = len(members)
-    wants, asked, is_open = (
-        np.zeros((num, num_bits), np.int64),
-        np.zeros(num_bits, np.int64),
-        np.zeros(num_bits, np.int64),
-    )
+    wants = np.zeros((num, num_bits), np.int64)
+    asked = np.zeros(num_bits, np.int64)
+    is_open = np.zeros(num_bits, np.int64)
     for i in range(num):
         for choice in range(choices.offsets[members[i]], choices.offsets[members[i] + 1]):
             for sensor in range(choices.columns.shape[1]):
@@ -171,11 +161,9 @@ def make_classes(choices: Choices, members: Ints, contested: Ints, class_of: Int
     num_words, most = max(1, (num_bits + _BITS - 1) // _BITS), len(members)
     for track in members:
         most += choices.offsets[track + 1] - choices.offsets[track]
-    offsets, masks, log_weights = (
-        np.zeros(len(members) + 1, np.int64),
-        np.empty((most, num_words), np.int64),
-        np.empty(most),
-    )
+    offsets = np.zeros(len(members) + 1, np.int64)
+    masks = np.empty((most, num_words), np.int64)
+    log_weights = np.empty(most)
     filled = 0
     for i in range(len(members)):
         first = filled

@@ -61,11 +61,9 @@ def _one_each(prior: Lmb, rows: Rows, num_sensors: int) -> Combinations:
     """Return a combination for each of the rows, of which the first are the prior's tracks, predicted as certain."""
     weigh_by_existence(prior.existence_logit, rows)
     num = len(rows.log_absent)
-    log_absent, tracks, columns = (
-        rows.log_absent.copy(),
-        np.empty(num, np.int64),
-        np.empty((num, num_sensors), np.int64),
-    )
+    log_absent = rows.log_absent.copy()
+    tracks = np.empty(num, np.int64)
+    columns = np.empty((num, num_sensors), np.int64)
     for i in range(num):
         rows.log_absent[i], tracks[i] = -math.inf, i
     return Combinations(rows, tracks, columns, log_absent)

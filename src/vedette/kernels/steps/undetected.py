@@ -13,9 +13,10 @@ import numpy as np
 from vedette.errors import ModelError
 from vedette.kernels.base.compile import borrowing, inlined, kernel
 from vedette.kernels.base.types import Floats, Marks, Mixture, Motion, Sensor
-from vedette.kernels.gaussian.components import make_components
-from vedette.kernels.gaussian.intensities import predicted_intensity
+from vedette.kernels.gaussian.components import make_components, stacked_mixtures
 from vedette.kernels.gaussian.marks import copy_marks
+from vedette.kernels.gaussian.prediction import predicted_intensity
+from vedette.kernels.gaussian.reduction import reduce_intensity
 
 # Standard deviations of a birth's position that represent "anywhere" about a measurement: wide relative to the noise.
 WIDE = 3.0
@@ -151,9 +152,9 @@ def _predicted_tables(tables: Floats, cells: Cells, motion: Motion, dt: float, a
 @kernel
 def predicted_undetected(before: Undetected, motion: Motion, dt: float, arrivals: Arrivals) -> Undetected:
     """Return the undetected targets `dt` seconds later."""
-    most = arrivals.max_components
+    intensity = stacked_mixtures(predicted_intensity(before.intensity, motion, dt), arrivals.born)
     return Undetected(
-        predicted_intensity(before.intensity, motion, dt, arrivals.born, most),
+        reduce_intensity(intensity, arrivals.max_components),
         _predicted_tables(before.tables, before.cells, motion, dt, arrivals),
         before.cells,
         before.places,

@@ -75,11 +75,9 @@ def _central_filter(scenario: Scenario, filters: tuple[Filter, ...]) -> CentralF
     model = scenario.model
     if model.fusion.kind not in SCAN_FUSIONS or not isinstance(model.filter, FilterSection):
         return None
-    targets, sensors, section = (
-        common_target_model(filters),
-        tuple(local.sensor for local in filters),
-        model.fusion.filter,
-    )
+    targets = common_target_model(filters)
+    sensors = tuple(local.sensor for local in filters)
+    section = model.fusion.filter
     if section is not None:
         central: CentralFilter = section.instantiate(
             scenario.folder, targets=targets, sensors=sensors, scene=partial(scene_for_program, scenario)

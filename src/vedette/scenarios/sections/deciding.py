@@ -12,9 +12,9 @@ from pydantic import Field
 from vedette.errors import InputError
 from vedette.internal.unit_warnings import suppress_unit_warnings
 from vedette.scenarios.diagnostics import Finding, describe
-from vedette.scenarios.sections.base import Count, Point, Positive, Probability, Section, check
+from vedette.scenarios.sections.base import Count, Point, Probability, Section, check
 from vedette.scenarios.sections.custom import Custom
-from vedette.scenarios.sections.derived import Part, derived, one_of
+from vedette.scenarios.sections.derived import Derived, Part, derived, one_of
 from vedette.scenarios.sections.world import RegionSection
 
 
@@ -97,20 +97,12 @@ class KeepOut(Section):
             return KeepOut(area, tuple(np.array(hole) for hole in self.holes))
 
 
-class Revisit(Section):
+@derived("vedette.control.constraints.revisit:Revisit")
+class Revisit(Part):
     """Maximum time between visits of each place by any moving sensor, or between scans of each target by any sensor."""
 
     kind: Literal["revisit"] = Field(default="revisit", description="Kind of constraint [-].")
     places: Annotated[tuple[Point, ...], Field(strict=False)] = Field((), description="Places; none: targets [m].")
-    existence: Probability = Field(default=0.5, description="Of targets: the least existence probability [-].")
-    radius: Positive = Field(description="Within which a sensor is at a place, or has a target in view [m].")
-    every: Positive = Field(description="Longest time from one visit of a place or scan of a target to the next [s].")
-
-    def build(self, folder: Path) -> Any:
-        """Return the constraint."""
-        from vedette.control.constraints import Revisit
-
-        return Revisit(self.places, self.radius, self.every, self.existence)
 
 
 if TYPE_CHECKING:
@@ -120,15 +112,15 @@ else:
     AnyConstraint = one_of("constraint", "control/constraints", "vedette.control:Constraint", own=_OWN)
 
 
-class Lookahead(Section):
+@derived(
+    "vedette.control.lookahead.planner:HorizonPlanner",
+    only=("depth", "period", "budget", "discount"),
+    first=("depth", "period", "method", "beam_width", "exploration", "rollout"),
+)
+class Lookahead(Derived):
     """How many decisions the strategy `lookahead` takes at once, of which it carries out the first."""
 
-    depth: Annotated[Count, Field(le=100)] = Field(default=3, description="Number of decisions [-].")
-    period: Positive | None = Field(
-        default=None,
-        description="Time from a decision to the next, a whole multiple of horizon_period; none: horizon_steps times "
-        "horizon_period [s].",
-    )
+    depth: Annotated[Count, Field(le=100)] = 3
     method: Literal["beam", "tree"] = Field(
         default="beam",
         description="Search where there are more joint sequences than the budget: beams of sequences, sensor by "
@@ -145,12 +137,6 @@ class Lookahead(Section):
         description="Of tree: how a beginning is completed, by random actions, or by keeping to the last one; none: "
         "random [-].",
     )
-    budget: Count = Field(default=2000, description="Most joint sequences that are evaluated for a decision [-].")
-    discount: Probability | None = Field(
-        default=0.25,
-        description="Weight of the reward at the end of a decision's horizon relative to that of the decision before; "
-        "none: only the end of the last one's counts [-].",
-    )
 
     @check
     def _fields_of_other_methods(self) -> Iterator[Finding]:
@@ -165,8 +151,7 @@ class Lookahead(Section):
         names = ("beam_width",) if self.method == "beam" else ("exploration", "rollout")
         given = {name: value for name in names if (value := getattr(self, name)) is not None}
         search = BeamSearch(**given) if self.method == "beam" else TreeSearch(**given)
-        shared = {name: getattr(self, name) for name in ("depth", "period", "budget", "discount")}
-        return {"search": search, **shared}
+        return {"search": search, **self.to_arguments()}
 
 
 if TYPE_CHECKING:

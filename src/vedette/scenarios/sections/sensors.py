@@ -24,7 +24,7 @@ from vedette.scenarios.sections.base import (
     Section,
     check,
 )
-from vedette.scenarios.sections.derived import of_kind
+from vedette.scenarios.sections.derived import Part, derived, of_kind
 from vedette.scenarios.sections.platforms import AnyPlatform
 from vedette.scenarios.sections.scan_times import ScanTimes
 from vedette.scenarios.sections.sensing import (
@@ -39,29 +39,20 @@ from vedette.scenarios.sections.sensing import (
 from vedette.scenarios.sections.true_sensors import BiasSection, TrueSensor, build_parts
 
 if TYPE_CHECKING:  # importing the models imports the compiler, which a check does not need
-    from vedette.models import ClassFeatures, Region, SensorModel, SignalModel
-    from vedette.models.turns import Turn
+    from vedette.models import ClassFeatures, Region, SensorModel
     from vedette.simulation import TrueSensor as TrueSensorModel
 
 
 CLUTTER = "clutter"  # key of false measurements among those of the classes
 
 
-class TurnSection(Section):
+@derived("vedette.models.turns:Turn")
+class TurnSection(Part):
     """How a radar's beam turns: a scan is one turn, and a target is measured when the beam passes it.
 
     In a simulation the time of a scan is the middle of the turn, when the beam points east; targets and radar move
     straight on in half a turn. In a recording the beam is where the rows say.
     """
-
-    period: Positive = Field(description="Of one turn [s].")
-    clockwise: bool = Field(default=True, description="Seen from above, as most radars turn [-].")
-
-    def build(self) -> Turn:
-        """Return the turn for recordings and poses."""
-        from vedette.models.turns import Turn
-
-        return Turn(self.period, self.clockwise)
 
 
 class Budget(Section):
@@ -79,20 +70,9 @@ class Budget(Section):
     )
 
 
-class SignalSection(Section):
+@derived("vedette.models.signal:SignalModel")
+class SignalSection(Part):
     """Signal-to-noise ratios of a sensor's measurements: of targets that fluctuate (Swerling I), and of noise."""
-
-    mean_db: float = Field(description="Mean ratio of targets [dB].")
-    threshold_db: float = Field(description="Threshold above which the sensor reports a measurement [dB].")
-    clutter_db: float = Field(
-        default=0.0, description="Mean power of clutter over that of the noise; 0: false measurements are noise [dB]."
-    )
-
-    def build(self) -> SignalModel:
-        """Return the model of the ratios."""
-        from vedette.models import SignalModel
-
-        return SignalModel(self.mean_db, self.threshold_db, self.clutter_db)
 
 
 class SizeSection(Section):

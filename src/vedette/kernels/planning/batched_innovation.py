@@ -1,196 +1,52 @@
-"""Extended Kalman steps of many Gaussians side by side, in loops that the compiler vectorises.
+"""Innovations of many Gaussians side by side, by the extended Kalman filter, in loops that the compiler vectorises.
 
-The formulas are those of `vedette.kernels.gaussian.prediction` and `innovation`. Entry (i, j) of all matrices is one
-row of numbers, one per Gaussian. If a number is not valid (a matrix that is not definite, a difference that cancels),
-and for sigma points, a Gaussian is processed alone by those kernels, whose result is final.
+The formulas are those of `vedette.kernels.gaussian.innovation`. If a number is not valid (a matrix that is not
+definite, a difference that cancels), and for sigma points, a Gaussian is processed alone by that kernel, whose result
+is final.
 """
 
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
 
-import numpy as np
-
-from vedette.kernels.base.compile import borrowing, inlined, kernel
+from vedette.kernels.base.compile import borrowing, inlined
 from vedette.kernels.base.elementary import logs
-from vedette.kernels.base.types import Bools, Floats, Motion, Sensor
+from vedette.kernels.base.types import Bools, Floats, Sensor
 from vedette.kernels.gaussian.innovation import (
     LARGEST_BEND,
     LEAST_SHRINKAGE,
-    Innovation,
     bends_over,
     expect,
     expect_measurement,
-    make_innovation,
 )
 from vedette.kernels.gaussian.linalg import LOG_2PI
-from vedette.kernels.gaussian.prediction import predict
 from vedette.kernels.gaussian.relinearisation import Pair, PairWork, relinearise
 from vedette.kernels.gaussian.row_noise import no_row_noise
-from vedette.kernels.gaussian.scratch import Scratch, make_scratch
 from vedette.kernels.gaussian.sigma_points import LINEARISED, SWITCHED
 from vedette.kernels.planning.batched_models import (
     ANY,
     ModelForms,
-    Offsets,
     fill_detection_of_gaussians,
     fill_jacobians,
     fill_measurements,
     fill_noise,
     find_offsets,
     jacobian_width,
-    make_offsets,
+)
+from vedette.kernels.planning.batched_prediction import BatchedGaussians, BatchWork
+from vedette.kernels.planning.lanes import (
+    add_product,
+    copy_rows,
     place,
+    place_in_symmetric,
+    put_matrix,
+    put_rows,
+    put_state,
+    set_row,
+    subtract_product,
     take_matrix,
     take_state,
 )
-
-
-class BatchedGaussians(NamedTuple):
-    """Predicted Gaussians and their expected measurements, as in `Innovation`, with lower triangles of the matrices."""
-
-    means: Floats  # (state_dim, room)
-    covs: Floats  # (state_dim (state_dim + 1) / 2, room)
-    predicted: Floats  # (meas_dim, room)
-    factor: Floats  # (meas_dim (meas_dim + 1) / 2, room) L
-    whitened_cross: Floats  # (meas_dim * state_dim, room) W, row by row
-    posterior: Floats  # (state_dim (state_dim + 1) / 2, room)
-    log_norm: Floats  # (room,)
-    prob_detection: Floats  # (room,)
-
-
-class BatchWork(NamedTuple):
-    """Working arrays."""
-
-    offsets: Offsets
-    product: Floats  # (state_dim * state_dim, room) Jacobian of the motion times covariance
-    jacobian: Floats  # (meas_dim * state_dim, room) Jacobian of the measurement
-    noise: Floats  # (meas_dim (meas_dim + 1) / 2, room)
-    volume: Floats  # (room,) determinant of the innovation covariance; NaN if processed alone
-    bends: Bools  # (room,) see `innovation`
-    scratch: Scratch
-    measurement: Floats  # (meas_dim,) of one Gaussian, like the following arrays
-    mean: Floats  # (state_dim,)
-    cov: Floats  # (state_dim, state_dim)
-    out_mean: Floats  # (state_dim,)
-    out_cov: Floats  # (state_dim, state_dim)
-    innovation: Innovation
-
-
-@kernel
-def make_batch(dim: int, meas_dim: int, room: int) -> BatchedGaussians:
-    size, meas_size = place(dim, 0), place(meas_dim, 0)
-    return BatchedGaussians(
-        np.empty((dim, room)),
-        np.empty((size, room)),
-        np.empty((meas_dim, room)),
-        np.empty((meas_size, room)),
-        np.empty((meas_dim * dim, room)),
-        np.empty((size, room)),
-        np.empty(room),
-        np.empty(room),
-    )
-
-
-@kernel
-def make_batch_work(dim: int, meas_dim: int, room: int) -> BatchWork:
-    return BatchWork(
-        make_offsets(room),
-        np.empty((dim * dim, room)),
-        np.empty((meas_dim * dim, room)),
-        np.empty((place(meas_dim, 0), room)),
-        np.empty(room),
-        np.empty(room, np.bool_),
-        make_scratch(dim, meas_dim),
-        np.empty(meas_dim),
-        np.empty(dim),
-        np.empty((dim, dim)),
-        np.empty(dim),
-        np.empty((dim, dim)),
-        make_innovation(1, dim, meas_dim),
-    )
-
-
-@inlined
-def _set(value: float, num: int, out: Floats) -> None:
-    for s in range(num):
-        out[s] = value
-
-
-@inlined
-def _add_scaled(scale: float, row: Floats, num: int, out: Floats) -> None:
-    # Jacobians of motion models are mostly zero.
-    if scale != 0.0:
-        for s in range(num):
-            out[s] += scale * row[s]
-
-
-@inlined
-def _add_product(a: Floats, b: Floats, num: int, out: Floats) -> None:
-    for s in range(num):
-        out[s] += a[s] * b[s]
-
-
-@inlined
-def _subtract_product(a: Floats, b: Floats, num: int, out: Floats) -> None:
-    for s in range(num):
-        out[s] -= a[s] * b[s]
-
-
-@inlined
-def _lower(i: int, j: int) -> int:
-    """Return the index of entry (i, j) of a symmetric matrix."""
-    return place(i, j) if i >= j else place(j, i)
-
-
-@borrowing
-def _predict_linear(
-    forms: ModelForms, means: Floats, covs: Floats, num: int, batch: BatchedGaussians, work: BatchWork
-) -> int:
-    """Apply m <- F m, P <- F P F' + Q. Returns how many are not finite or not positive on the diagonal."""
-    dim, transition, noise, wrong = means.shape[0], forms.transition, forms.motion_noise, 0
-    for i in range(dim):
-        _set(0.0, num, batch.means[i])
-        for k in range(dim):
-            _add_scaled(transition[i, k], means[k], num, batch.means[i])
-            _set(0.0, num, work.product[i * dim + k])
-            for j in range(dim):
-                _add_scaled(transition[i, j], covs[_lower(j, k)], num, work.product[i * dim + k])
-    for i in range(dim):
-        for j in range(i + 1):
-            out = batch.covs[place(i, j)]
-            _set(0.5 * (noise[i, j] + noise[j, i]), num, out)
-            for k in range(dim):
-                _add_scaled(transition[j, k], work.product[i * dim + k], num, out)
-        mean, variance = batch.means[i], batch.covs[place(i, i)]
-        for s in range(num):
-            wrong += 0 if 0.0 < variance[s] < math.inf and abs(mean[s]) < math.inf else 1
-    return wrong
-
-
-@borrowing
-def predict_batch(
-    motion: Motion,
-    forms: ModelForms,
-    dt: float,
-    means: Floats,
-    covs: Floats,
-    num: int,
-    batch: BatchedGaussians,
-    work: BatchWork,
-) -> None:
-    """Predict the first `num` Gaussians of means (state_dim, room) and covs into the batch, as `prediction.predict`."""
-    if forms.is_linear == 1 and _predict_linear(forms, means, covs, num, batch, work) == 0:
-        return
-    for s in range(num):
-        take_state(means, s, work.mean)
-        take_matrix(covs, s, work.cov)
-        predict(motion, dt, work.mean, work.cov, work.out_mean, work.out_cov, work.scratch)
-        for i in range(len(work.mean)):
-            batch.means[i, s] = work.out_mean[i]
-            for j in range(i + 1):
-                batch.covs[place(i, j), s] = work.out_cov[i, j]
 
 
 @inlined
@@ -200,14 +56,14 @@ def _project(width: int, num: int, batch: BatchedGaussians, work: BatchWork) -> 
     for a in range(meas_dim):
         for j in range(dim):
             cross = batch.whitened_cross[a * dim + j]
-            _set(0.0, num, cross)
+            set_row(0.0, num, cross)
             for k in range(width):
-                _add_product(work.jacobian[a * dim + k], batch.covs[_lower(k, j)], num, cross)
+                add_product(work.jacobian[a * dim + k], batch.covs[place_in_symmetric(k, j)], num, cross)
         for b in range(a + 1):
             entries, noise = batch.factor[place(a, b)], work.noise[place(a, b)]
-            _set(0.0, num, entries)
+            set_row(0.0, num, entries)
             for k in range(width):
-                _add_product(batch.whitened_cross[a * dim + k], work.jacobian[b * dim + k], num, entries)
+                add_product(batch.whitened_cross[a * dim + k], work.jacobian[b * dim + k], num, entries)
             for s in range(num):
                 entries[s] += noise[s]
 
@@ -216,13 +72,13 @@ def _project(width: int, num: int, batch: BatchedGaussians, work: BatchWork) -> 
 def _condition(num: int, batch: BatchedGaussians, work: BatchWork) -> None:
     """Factor the innovation covariances, whiten the cross-covariances, and write the posterior covariances."""
     dim, meas_dim, volume = batch.means.shape[0], batch.predicted.shape[0], work.volume
-    _set(1.0, num, volume)
+    set_row(1.0, num, volume)
     for a in range(meas_dim):
         pivots = batch.factor[place(a, a)]
         for b in range(a + 1):
             entries = batch.factor[place(a, b)]
             for k in range(b):
-                _subtract_product(batch.factor[place(a, k)], batch.factor[place(b, k)], num, entries)
+                subtract_product(batch.factor[place(a, k)], batch.factor[place(b, k)], num, entries)
             if b < a:
                 divisors = batch.factor[place(b, b)]
                 for s in range(num):
@@ -235,16 +91,15 @@ def _condition(num: int, batch: BatchedGaussians, work: BatchWork) -> None:
         for j in range(dim):
             cross = batch.whitened_cross[a * dim + j]
             for k in range(a):
-                _subtract_product(batch.factor[place(a, k)], batch.whitened_cross[k * dim + j], num, cross)
+                subtract_product(batch.factor[place(a, k)], batch.whitened_cross[k * dim + j], num, cross)
             for s in range(num):
                 cross[s] /= pivots[s]
+    copy_rows(batch.covs, num, batch.posterior)
     for i in range(dim):
         for j in range(i + 1):
-            given, out = batch.covs[place(i, j)], batch.posterior[place(i, j)]
-            for s in range(num):
-                out[s] = given[s]
             for a in range(meas_dim):
-                _subtract_product(batch.whitened_cross[a * dim + i], batch.whitened_cross[a * dim + j], num, out)
+                crosses = batch.whitened_cross[a * dim + i], batch.whitened_cross[a * dim + j]
+                subtract_product(crosses[0], crosses[1], num, batch.posterior[place(i, j)])
 
 
 @inlined
@@ -294,16 +149,11 @@ def _mark_cancelled(num: int, batch: BatchedGaussians, work: BatchWork) -> int:
 @inlined
 def _put_innovation(s: int, batch: BatchedGaussians, work: BatchWork) -> None:
     """Write the innovation of one Gaussian into the batch, except its detection probability."""
-    dim, innovation = batch.means.shape[0], work.innovation
-    for a in range(batch.predicted.shape[0]):
-        batch.predicted[a, s] = innovation.predicted[0, a]
-        for b in range(a + 1):
-            batch.factor[place(a, b), s] = innovation.factor[0, a, b]
-        for j in range(dim):
-            batch.whitened_cross[a * dim + j, s] = innovation.whitened_cross[0, a, j]
-    for i in range(dim):
-        for j in range(i + 1):
-            batch.posterior[place(i, j), s] = innovation.covs[0, i, j]
+    innovation = work.innovation
+    put_state(innovation.predicted[0], s, batch.predicted)
+    put_matrix(innovation.factor[0], s, batch.factor)
+    put_rows(innovation.whitened_cross[0], s, batch.whitened_cross)
+    put_matrix(innovation.covs[0], s, batch.posterior)
     batch.log_norm[s] = innovation.log_norm[0]
 
 
