@@ -106,7 +106,7 @@ class SingleSensorFilter(WithBirths):
         limits: caps and thresholds.
 
     Raises:
-        InputError: a part of another kind.
+        InputError: a part of another kind, or a measurement of a component that states do not have.
     """
 
     targets: TargetModel
@@ -118,6 +118,7 @@ class SingleSensorFilter(WithBirths):
             value = getattr(self, name)
             if not isinstance(value, kind):
                 raise InputError(f"{name}: expected a {kind.__name__}; got {type(value).__name__}")
+        self.sensor.measurement.check_motion("sensor.measurement", self.targets.motion.components)
         object.__setattr__(self, "sensor", with_default_detection_at(self.sensor, self.default_detection_at))
 
     def _inputs_after(

@@ -8,7 +8,7 @@ from typing import Literal
 
 import numpy as np
 
-from vedette.kernels.base.types import Floats, Marks
+from vedette.kernels.base.types import VX, VY, Floats, Marks
 from vedette.kernels.gaussian.marks import unmarked
 from vedette.models.arguments import float_array, instance, no_gaussians, positive, positive_definite, real, reject
 from vedette.models.grid import CellGrid
@@ -79,7 +79,7 @@ class MeasurementBirth:
             return None
         grid, speed = (
             CellGrid(self.region, cells_a_side, cells_a_side),
-            float(self.std[2]) if len(self.std) > 2 else 0.0,
+            float(self.std[VX]) if len(self.std) > VY else 0.0,
         )
         if self.is_learnt:
             return UndetectedModel(grid, 1.0, birth_rate=LEARNT, speed=speed)
