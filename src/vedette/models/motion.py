@@ -56,8 +56,8 @@ class MotionModel:
         transition_jacobian: model function of kind `transition_jacobian`, or None.
         method: "auto" (EKF if there is a Jacobian, else UKF), "ekf", "ukf" or "ckf".
         components: names of the components of the state: px and py, in a state of four or more then vx and vy, and in
-            any order the height pz, the vertical velocity vz, an acceleration ax, ay, a turn rate turn_rate, or names
-            of your own. (): all behind position and velocity are your own.
+            any order the height pz, the vertical velocity vz, an acceleration ax, ay, a turn rate turn_rate, or custom
+            names. (): all components behind position and velocity are custom.
 
     Raises:
         InputError: a function of another kind, a bad dimension or parameter, "ekf" without a Jacobian, names of another
