@@ -172,7 +172,7 @@ FAULTS = [
 ]
 WANTED = [
     "sensor_defaults.measurement.kind: expected one of bearing_range, bearing_range_rate, bearing_only, range_only, "
-    "position, or a motion with pz, such as constant_velocity_height (as targets have no height: px, py, vx, vy); got",
+    "position, or a motion with pz (as targets have px, py, vx, vy); got",
     "noise.sigma_altitude: expected a number above 0, as altitudes are measured; got none",
     "height: expected 0, as a bearing_range measurement does not depend on heights; got 100.0",
     "clutter: expected region, measurement_space or custom clutter for a bearing_range_altitude measurement; got",

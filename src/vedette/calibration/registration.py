@@ -84,9 +84,8 @@ def match_measurements(
         lmb = as_lmb(state.fused)
         sure = lmb.existence > _SURE
         moments, means = track_moments(lmb.tracks)[0][sure], np.zeros((int(sure.sum()), len(_STATE)))
-        for i, name in enumerate(components):
-            if name in _STATE:
-                means[:, _STATE.index(name)] = moments[:, i]
+        for name in set(_STATE).intersection(components):
+            means[:, _STATE.index(name)] = moments[:, components.index(name)]
         if state.time is not None:
             means = _moved(means, np.full(len(means), time - state.time))
         labels = [numbers.setdefault(tuple(label), len(numbers)) for label in lmb.tracks.labels[sure].tolist()]

@@ -110,9 +110,7 @@ def state_columns(means: Floats, covs: Floats, components: Sequence[str] = ()) -
     columns = {_COLUMNS[name]: j for j, name in enumerate(names) if name in _COLUMNS}
     with np.errstate(invalid="ignore"):
         stds = np.sqrt(np.diagonal(covs, axis1=1, axis2=2))
-    return {name: means[:, j].tolist() for name, j in columns.items()} | {
-        f"std_{name}": stds[:, j].tolist() for name, j in columns.items()
-    }
+    return {f"{of}{name}": x[:, j].tolist() for of, x in (("", means), ("std_", stds)) for name, j in columns.items()}
 
 
 def _place(state: Floats) -> str:

@@ -44,14 +44,13 @@ def track_table(
     `time_s` is that of the record plus `start`; `utc` if that is since 1970. `label` is `birth step.index`. `track` is
     the first label of its track, different from `label` after a gap that `joins` close. `x_m`, `y_m`, `vx_mps`,
     `vy_mps` are the estimate, `std_...` its standard deviations (velocities only if the state has them: four components
-    or more, and `z_m`, `vz_mps` if `components` has them), `existence` is the existence probability. `lon_deg`,
-    `lat_deg` need an origin. `course_deg`, clockwise from true north, and `speed_mps` need a compass. `target` is the
-    name of the true target that OSPA's assignment gives it, nearer than `cutoff` (m), or None.
+    or more, with `components` also `z_m`, `vz_mps`), `existence` is the existence probability. `lon_deg`, `lat_deg`
+    need an origin. `course_deg`, clockwise from true north, and `speed_mps` need a compass. `target` is the name of the
+    true target that OSPA's assignment gives it, nearer than `cutoff` (m), or None.
 
     With `classes`, their names, `class` is the most probable one and `prob_...` the probability of each.
 
-    names: of the true targets, by their ids, else `id + 1`. joins: see `vedette.evaluation.joining`. components: of the
-    motion.
+    names: of the true targets, by their ids, else `id + 1`. joins: see `evaluation.joining`. components: of the motion.
     """
     matching = match_run(record.truth, record.estimates, cutoff=cutoff, order=1.0)
     matched_targets = dict(

@@ -77,10 +77,8 @@ class MeasurementBirth:
         """
         if self.region is None:
             return None
-        grid, speed = (
-            CellGrid(self.region, cells_a_side, cells_a_side),
-            float(self.std[VX]) if len(self.std) > VY else 0.0,
-        )
+        grid = CellGrid(self.region, cells_a_side, cells_a_side)
+        speed = float(self.std[VX]) if len(self.std) > VY else 0.0
         if self.is_learnt:
             return UndetectedModel(grid, 1.0, birth_rate=LEARNT, speed=speed)
         return UndetectedModel(grid, 0.0, speed=speed)

@@ -39,8 +39,7 @@ def _rise(state: Floats, params: Floats) -> Rise:
 
 @inlined
 def _height_at_beam(state: Floats, at: Passage, params: Floats) -> float:
-    rise = _rise(state, params)
-    return state[rise.height] + at.lag * rise.speed  # type: ignore[no-any-return]
+    return state[int(params[0])] + at.lag * _rise(state, params).speed  # type: ignore[no-any-return]
 
 
 @inlined

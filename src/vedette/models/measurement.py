@@ -155,7 +155,7 @@ class MeasurementModel:
         """Raise `InputError` for a motion without a component that the function reads. field: of this model."""
         for place, name in enumerate(self.state_components):
             if place_of(name, components) != place:
-                wanted = f"a motion with {name} as component {place} (a model made with its components can differ)"
+                wanted = f"a motion with {name} as component {place}, or a model for the components of the motion"
                 raise reject(field, wanted, ", ".join(components))
 
     def measure(self, states: ArrayLike, pose: ArrayLike) -> Floats:

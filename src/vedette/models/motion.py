@@ -60,8 +60,7 @@ class MotionModel:
             names. (): all components behind position and velocity are custom.
 
     Raises:
-        InputError: a function of another kind, a bad dimension or parameter, "ekf" without a Jacobian, names of another
-            number or order.
+        InputError: a function of another kind, a bad dimension, parameter or name, "ekf" without a Jacobian.
     """
 
     state_dim: int
@@ -78,8 +77,7 @@ class MotionModel:
         begin = PLANE[: len(PLANE) if dim > VY else 2]
         names = tuple(self.components) or (*begin, *(f"own_{i}" for i in range(len(begin), dim)))
         if len(set(names)) < len(names) or len(names) != dim or names[: len(begin)] != begin:
-            wanted = f"{dim} different names, first {', '.join(begin)}"
-            raise reject("MotionModel.components", wanted, self.components)
+            raise reject("MotionModel.components", f"{dim} different names, first {', '.join(begin)}", self.components)
         object.__setattr__(self, "components", names)
         require_kind("MotionModel.transition", self.transition, "transition")
         require_kind("MotionModel.process_noise_cov", self.process_noise_cov, "process_noise_cov")
@@ -130,9 +128,8 @@ class MotionModel:
         for axis, moved in enumerate(places[1:] - places[0]):
             if moved[axis] <= 10.0 * abs(moved[1 - axis]):  # not if one is NaN, which is another fault
                 x, y = moved / _BRIEF
-                return (
-                    f"component {VX + axis}, of which 1 more moves a target by {x:g} m/s along x and {y:g} m/s along y"
-                )
+                by = f"{x:g} m/s along x and {y:g} m/s along y"
+                return f"component {VX + axis}, of which 1 more moves a target by {by}"
         return None
 
     def check(self, states: ArrayLike, dt: float = 1.0) -> None:
@@ -149,8 +146,7 @@ class MotionModel:
             probe_covariance(self.process_noise_cov, (state, dt, self.noise_params), self.state_dim, definite=False)
             if self.transition_jacobian is not None:
                 probe_jacobian(self.transition_jacobian, self.transition, args, shape, False)
-        fault = self.velocity_fault()
-        if fault is not None:
+        if (fault := self.velocity_fault()) is not None:
             raise ModelError(f"motion: expected a state {STATE_ORDER}; got {fault}")
 
 

@@ -39,7 +39,7 @@ def recorded_targets(world: ScenarioModel, folder: Path) -> RecordedSource:
         return found
     measured = world.recording is None and any(each.measurement.kind in HEIGHT_DEPENDENT for each in world.sensors)
     if measured or world.ospa.components == "position_and_height":
-        wanted = "a column altitude_m of every report" if has_height else "motion: constant_velocity_height"
+        wanted = "a column altitude_m of every report, and a motion with only pz and vz behind the velocity"
         raise InputError(f"{section.path}: expected {wanted}, as true heights are measured or compared; got none")
     return found
 

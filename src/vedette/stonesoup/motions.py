@@ -139,8 +139,7 @@ def _of_axes(model: Any) -> tuple[MotionModel, StateLayout]:
     if num == 2 and noise[0] == noise[1]:
         return constant_velocity(math.sqrt(noise[0]), noise_model="continuous_white"), layout
     functions = _taylor, _integrated_noise, np.empty(0), noise, _taylor_jacobian
-    names = (*PLANE, "ax", "ay") if num == 3 else ()
-    return MotionModel(2 * num, *functions, components=names), layout
+    return MotionModel(2 * num, *functions, components=(*PLANE, "ax", "ay") if num == 3 else ()), layout
 
 
 def _of_turn(model: Any) -> tuple[MotionModel, StateLayout]:

@@ -68,12 +68,7 @@ def ospa(estimates: ArrayLike, truths: ArrayLike, *, cutoff: float, order: float
 
 
 def ospa_of_run(
-    truth: Truth,
-    estimates: Sequence[Estimate],
-    *,
-    cutoff: float,
-    order: float,
-    components: ArrayLike = "position",
+    truth: Truth, estimates: Sequence[Estimate], *, cutoff: float, order: float, components: ArrayLike = "position"
 ) -> Floats:
     """Return the OSPA of the estimates at every scan of a run.
 

@@ -201,9 +201,8 @@ def bends_over(
 
     A measurement of a position at distance d has second derivatives of about |H| / d. Over a position of variance V,
     both axes together, component a is then off by |H_a| V / (2 d), which is the sagitta V / (2 d) of a range, and by
-    |H_aj| sqrt(V P_jj) / d with another component j of the state. A height that is measured is part of the position.
-
-    height: its place in the state, or -1.
+    |H_aj| sqrt(V P_jj) / d with another component j of the state. A height that is measured is part of the position,
+    `height` is its place in the state, or -1.
     """
     dx, dy, variance = mean[0] - pose[0], mean[1] - pose[1], cov[0, 0] + cov[1, 1]
     square = dx * dx + dy * dy

@@ -120,8 +120,7 @@ class ScenarioModel(ScenarioFields):
     def _heights(self) -> Iterator[Finding]:
         """Yield faults if measurements depend on a height but states of the filters or the true targets have none."""
         others = ", ".join(each for each in COMPONENTS if each not in HEIGHT_DEPENDENT)
-        wanted = f"one of {others}, or a motion with {HEIGHT}, such as constant_velocity_height"
-        wanted += f" (as targets have no height: {', '.join(self.motion.components)})"
+        wanted = f"one of {others}, or a motion with {HEIGHT} (as targets have {', '.join(self.motion.components)})"
         for i, kind in enumerate([sensor.measurement.kind for sensor in self.sensors]):
             if kind in HEIGHT_DEPENDENT and HEIGHT not in self.motion.components:
                 yield ("sensors", i, "measurement", "kind"), wanted, describe(kind)

@@ -36,7 +36,7 @@ from vedette.scenarios.sections.sensing import (
     clutter_findings,
     noise_findings,
 )
-from vedette.scenarios.sections.true_sensors import BiasSection, Components, TrueSensor, build_parts
+from vedette.scenarios.sections.true_sensors import BiasSection, Names, TrueSensor, build_parts
 
 if TYPE_CHECKING:  # importing the models imports the compiler, which a check does not need
     from vedette.models import ClassFeatures, Region, SensorModel, SignalModel
@@ -311,7 +311,7 @@ class Sensor(Section):
         return (*self.pose[:BEAM], 0.0, self.turn.build().rate, *self.pose[OWN_HEIGHT:])
 
     def build(
-        self, region: Region, method: GaussianMethod, folder: Path, state: Components, detection_at: str | None = None
+        self, region: Region, method: GaussianMethod, folder: Path, state: Names, detection_at: str | None = None
     ) -> SensorModel:
         """Return the model of the sensor in the filters; the file of a custom model is relative to `folder`.
 
@@ -324,7 +324,7 @@ class Sensor(Section):
         with suppress_unit_warnings():
             return SensorModel(**parts, method=method, detection_at=detection_at)
 
-    def build_true(self, known: SensorModel, region: Region, folder: Path, state: Components) -> TrueSensorModel:
+    def build_true(self, known: SensorModel, region: Region, folder: Path, state: Names) -> TrueSensorModel:
         """Return the true sensor for the model in the filters; raises like `build`."""
         from vedette.simulation.true_sensors import TrueSensor as Made
 

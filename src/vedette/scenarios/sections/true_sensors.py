@@ -30,19 +30,18 @@ if TYPE_CHECKING:  # importing the models imports the compiler, which a check do
     from vedette.simulation import TrueSensor as TrueSensorModel
 
 
-Components: TypeAlias = tuple[str, ...]  # of the states of a motion
+Names: TypeAlias = tuple[str, ...]  # of the components of a state
 
 
 def build_parts(
-    section: Any, like: Measurement, region: Region, folder: Path, state: Components, known: Any = None
+    section: Any, like: Measurement, region: Region, folder: Path, state: Names, known: Any = None
 ) -> dict[str, Any]:
     """Return the models of measurement, noise, detection and clutter that a section gives, by these names.
 
     like: the measurement to which noise and clutter apply. state: components of the motion. known: the measurement
     model if the section gives none.
     """
-    own = section.measurement
-    model = known if own is None else own.build(folder, state_components=state)
+    model = known if section.measurement is None else section.measurement.build(folder, state_components=state)
     given = {"measurement": model, "angular": model.angular, "kind": like.kind, "region": region}
     found = {name: part for name in ("noise", "detection", "clutter") if (part := getattr(section, name)) is not None}
     folded = getattr(like, "max_unambiguous_range_rate", None)
@@ -125,9 +124,7 @@ class TrueSensor(Section):
         """Return the measurement for noise and clutter: the filters' or, in place of a custom one, the true one."""
         return known if self.measurement is None or known.kind != "custom" else self.measurement
 
-    def build(
-        self, known: SensorModel, sensor: Any, region: Region, folder: Path, state: Components
-    ) -> TrueSensorModel:
+    def build(self, known: SensorModel, sensor: Any, region: Region, folder: Path, state: Names) -> TrueSensorModel:
         """Return the true sensor, given the filters' model and the section of the sensor. state: see `build_parts`.
 
         Raises:

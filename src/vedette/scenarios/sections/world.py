@@ -89,9 +89,7 @@ class CustomMotion(Custom):
     """A user's `MotionModel`."""
 
     kind: Literal["custom"] = Field(default="custom", description="Kind of motion [-].")
-    components: Annotated[tuple[str, ...], Field(strict=False, min_length=2, max_length=100)] = Field(
-        description="Names of the components of its state [-]."
-    )
+    components: tuple[str, ...] = Field(strict=False, min_length=2, description="Components of its state, by name [-].")
     gives: ClassVar[str] = "vedette.models:MotionModel"
 
     @property
@@ -110,8 +108,7 @@ class CustomMotion(Custom):
         if motion.components != self.components:
             wanted = f"those of {self.function}, {', '.join(motion.components)}"
             raise MissingMember(self, "components", wanted, ", ".join(self.components))
-        fault = motion.velocity_fault()
-        if fault is not None:
+        if (fault := motion.velocity_fault()) is not None:
             raise MissingMember(self, "function", f"a state {STATE_ORDER}", fault)
         return motion if method == "auto" else replace(motion, method=method)
 
