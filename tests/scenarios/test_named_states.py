@@ -21,7 +21,7 @@ from vedette.evaluation import measure_run, run_scenario
 from vedette.evaluation.track_table import table_of_run
 from vedette.filters import FactoredGlmbFilter, LmbFilter, MultiSensorGlmbFilter
 from vedette.platforms.compass import PlaneCompass, courses_of
-from vedette.scenarios import Scenario, parse_scenario
+from vedette.scenarios import load_scenario, parse_scenario
 
 HERE = Path(__file__).parent
 FLAT = ("px", "py", "vx", "vy", "ax", "ay")
@@ -48,7 +48,7 @@ def targets(motion: models.MotionModel) -> models.TargetModel:
     ],
 )
 def test_an_acceleration_is_not_taken_for_a_height(made) -> None:
-    with pytest.raises(InputError, match=r"measurement: expected a motion with pz as component 4 .*got .*vy, ax, ay$"):
+    with pytest.raises(InputError, match=r"measurement: expected a motion with pz as component 4, .*got .*vy, ax, ay$"):
         made(targets(accelerating()), radar(models.bearing_slant_range()))
     with pytest.raises(InputError, match=r"state_components: expected names with pz, the height; got .*ax, ay"):
         models.bearing_slant_range(accelerating().components)
@@ -111,6 +111,13 @@ def scene(motion: str, components: tuple[str, ...], kind: str) -> str:
     return reduce(lambda text, word: text.replace(*word), words.items(), SCENE)
 
 
+def written(folder: Path, text: str) -> Path:
+    """The file of a scenario, beside the models that it names."""
+    (folder / "own_models.py").write_text((HERE / "own_models.py").read_text("utf-8"), "utf-8")
+    (folder / "air.yaml").write_text(text, "utf-8")
+    return folder / "air.yaml"
+
+
 def test_a_scenario_of_heights_needs_a_motion_with_one() -> None:
     with pytest.raises(ScenarioError) as error:
         parse_scenario(scene("accelerating", FLAT, "bearing_range_altitude"), "air.yaml", folder=HERE)
@@ -119,13 +126,13 @@ def test_a_scenario_of_heights_needs_a_motion_with_one() -> None:
 
 
 @pytest.mark.parametrize("motion", ["accelerating", "accelerating_at_height"])
-def test_states_are_read_by_their_names(motion: str) -> None:
+def test_states_are_read_by_their_names(tmp_path: Path, motion: str) -> None:
     names = FLAT if motion == "accelerating" else HIGH
     kind = "bearing_range" if motion == "accelerating" else "bearing_range_altitude"
     text = scene(motion, names, kind)
     text = text.replace("origin:", "ospa: {components: position_and_height}\norigin:") if "pz" in names else text
-    scenario = Scenario(parse_scenario(text, "air.yaml", folder=HERE), folder=HERE)
-    record = run_scenario(scenario, "stationary", seed=1)
+    scenario = load_scenario(written(tmp_path, text))
+    record = run_scenario(scenario, "stationary", seed=2)
     (mean,), (cov,) = record.estimates[-1].means, record.estimates[-1].covs
     ((*_,), (true,)) = record.truth.at(11)
     off = mean - true
@@ -148,10 +155,8 @@ def test_states_are_read_by_their_names(motion: str) -> None:
 
 
 def test_the_replay_has_the_heights_of_the_motion(tmp_path: Path) -> None:
-    (tmp_path / "own_models.py").write_text((HERE / "own_models.py").read_text("utf-8"), "utf-8")
-    (tmp_path / "air.yaml").write_text(scene("accelerating_at_height", HIGH, "bearing_range_altitude"), "utf-8")
-    out = tmp_path / "out"
-    for command in (["run", str(tmp_path / "air.yaml"), "--out", str(out)], ["report", str(out)]):
+    file, out = written(tmp_path, scene("accelerating_at_height", HIGH, "bearing_range_altitude")), tmp_path / "out"
+    for command in (["run", str(file), "--out", str(out)], ["report", str(out)]):
         result = CliRunner().invoke(app, command)
         assert result.exit_code == 0, result.output
     found = re.search(r'<script[^>]*id="runs"[^>]*>(.*?)</script>', (out / "report.html").read_text("utf-8"), re.DOTALL)
