@@ -97,8 +97,9 @@ def write(folder: Path, aircraft: Aircraft, kind: str, num_radars: int) -> None:
 def track(folder: Path, aircraft: Aircraft) -> Floats:
     """(4,) mean error in the plane and in height, m; share of aircraft with an estimate; median squared error."""
     found = scenario_from_recording(folder / "radars.yaml", folder / "scans.csv", speed=250.0)
-    record, has_height = track_recording(found.scenario, found.recording), found.scenario.model.has_heights
-    kept = [0, 1, 4] if has_height else [0, 1]
+    record, components = track_recording(found.scenario, found.recording), found.scenario.model.motion.components
+    has_height = "pz" in components
+    kept = [0, 1, components.index("pz")] if has_height else [0, 1]
     plane, heights, squares, shares = list[float](), list[float](), list[float](), list[float]()
     for time, estimate in zip(record.times.tolist(), record.estimates, strict=True):
         if time < 60.0:

@@ -128,8 +128,7 @@ def computed(case: Case) -> Arrays:
 
 
 def _run(case: Case, folder: Path) -> Arrays:
-    from vedette.evaluation.metrics import ospa_of_run
-    from vedette.evaluation.runs import measure_run
+    from vedette.evaluation.runs import build_score, measure_run
     from vedette.scenarios import load_scenario, replace_fields
     from vedette.scenarios.build import build_experiment, build_planner
     from vedette.simulation import simulate
@@ -138,13 +137,9 @@ def _run(case: Case, folder: Path) -> Arrays:
         strategy, scenario = _random(case.run, folder), load_scenario(folder / "scenario.yaml")
     else:
         strategy, scenario = case.strategy, replace_fields(load_scenario(case.scenario), case.fields)
-    ospa = scenario.model.ospa
     experiment, planner = build_experiment(scenario), build_planner(scenario, strategy, 1)
     watched = Watched(experiment.tracker)
-
-    def score(truth: Any, estimates: Any) -> Any:
-        return ospa_of_run(truth, estimates, cutoff=ospa.cutoff, order=ospa.order, components=ospa.components)
-
+    score = build_score(scenario)
     record = simulate(replace(experiment, tracker=watched), planner, seed=3, run=case.run, score=score)
     found: Arrays = {"poses": record.poses, "ospa": record.ospa}
     for k, (state, estimate) in enumerate(zip(watched.states, record.estimates, strict=True)):

@@ -16,9 +16,9 @@ from vedette.control.constraints import MaxActive
 from vedette.control.inputs import options_of, stationary_courses
 from vedette.errors import InputError, ScenarioError
 from vedette.evaluation.runs import run_scenario
+from vedette.kernels.base.types import BUDGET
 from vedette.platforms import HeadingPlatform, Operated, Sequences, Stationary
 from vedette.platforms.base import options_at
-from vedette.platforms.operated import LEFT
 from vedette.scenarios import load_scenario, replace_fields
 
 TIMES = np.arange(1.0, 7.0)
@@ -35,22 +35,22 @@ def limited(example: Situation, left: float, **operated: Any) -> Situation:
         replace(own, platform=Operated(own.platform, switchable=True, budget=100.0, **operated))
         for own in example.sensors
     )
-    poses = np.zeros((len(example.sensors), LEFT + 1))
-    poses[:, :3], poses[:, LEFT] = example.poses[:, :3], left
+    poses = np.zeros((len(example.sensors), BUDGET + 1))
+    poses[:, :3], poses[:, BUDGET] = example.poses[:, :3], left
     return replace(example, sensors=tuple(sensors), poses=poses)
 
 
 def test_a_sensor_scans_until_none_is_left() -> None:
     found = options_at("platform", Operated(Stationary(), switchable=True, budget=10.0), pose(3.0), TIMES)
     assert found.scans.tolist() == [[True] * 3 + [False] * 3, [False] * 6]
-    assert found.courses[:, :, LEFT].tolist() == [[2.0, 1.0, 0.0, 0.0, 0.0, 0.0], [3.0] * 6]
+    assert found.courses[:, :, BUDGET].tolist() == [[2.0, 1.0, 0.0, 0.0, 0.0, 0.0], [3.0] * 6]
 
 
 def test_a_refill_is_added_up_to_the_budget() -> None:
     platform = Operated(Stationary(), switchable=True, budget=4.0, refill=0.5)
     found = options_at("platform", platform, pose(2.0), TIMES)
     assert found.scans.tolist() == [[True] * 4 + [False] * 2, [False] * 6]
-    on, off = found.courses[:, :, LEFT].tolist()
+    on, off = found.courses[:, :, BUDGET].tolist()
     assert on == [1.5, 1.0, 0.5, 0.0, 0.5, 1.0]
     assert off == [2.5, 3.0, 3.5, 4.0, 4.0, 4.0]
     always = options_at("platform", Operated(Stationary(), budget=4.0, refill=1.0), pose(0.0), TIMES)
@@ -104,7 +104,7 @@ def test_no_strategy_scans_longer_than_the_budget(planner: str) -> None:
     seconds = record.times[first:][-1] - record.times[first - 1]
     assert num_scans[0] * model.model.time.step_period <= 6.0
     assert num_scans[1] * model.model.time.step_period <= 4.0 + 0.25 * seconds
-    assert (record.poses[:, :, LEFT] >= 0.0).all()
+    assert (record.poses[:, :, BUDGET] >= 0.0).all()
     if planner in ("nearest", "constant"):
         assert num_scans[0] * model.model.time.step_period == 6.0
 

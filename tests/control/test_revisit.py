@@ -10,9 +10,9 @@ import pytest
 from vedette.control.constraints import ConstraintContext, Revisit
 from vedette.errors import InputError, ScenarioError
 from vedette.evaluation.runs import run_scenario
+from vedette.kernels.base.types import VISITS
 from vedette.platforms import HeadingPlatform, Patrolling, Stationary
 from vedette.platforms.base import options_at
-from vedette.platforms.patrolling import CLOCKS
 from vedette.scenarios import Scenario, load_scenario, replace_fields
 
 PLACES, RADIUS, EVERY = ((0.0, 250.0), (-250.0, -100.0)), 80.0, 45.0
@@ -20,7 +20,7 @@ TIMES = np.arange(1.0, 13.0)
 
 
 def pose(x: float, y: float, *since: float) -> Any:
-    return np.array([x, y, *(0.0,) * (CLOCKS - 2), *since])
+    return np.array([x, y, *(0.0,) * (VISITS - 2), *since])
 
 
 def test_the_seconds_since_a_visit_are_those_of_a_dense_walk() -> None:
@@ -35,16 +35,16 @@ def test_the_seconds_since_a_visit_are_those_of_a_dense_walk() -> None:
             way = start[:2] + 10.0 * dense[:, np.newaxis] * np.array([np.cos(heading), np.sin(heading)])
             for k, place in enumerate(places):
                 inside = np.hypot(*(way - place).T) <= 15.0
-                for time, clock in zip(TIMES, course[:, CLOCKS + k], strict=True):
+                for time, clock in zip(TIMES, course[:, VISITS + k], strict=True):
                     visited = dense[(dense <= time) & inside]
-                    wanted = time - visited[-1] if len(visited) else start[CLOCKS + k] + time
+                    wanted = time - visited[-1] if len(visited) else start[VISITS + k] + time
                     assert clock == pytest.approx(wanted, abs=2e-3)
 
 
 def test_a_platform_that_stays_at_a_place_is_there_all_the_time() -> None:
     found = options_at("platform", Patrolling(Stationary(), PLACES, RADIUS), pose(0.0, 240.0, 9.0, 9.0), TIMES).courses
-    assert found[0, :, CLOCKS].tolist() == [0.0] * 12
-    assert found[0, :, CLOCKS + 1].tolist() == (9.0 + TIMES).tolist()
+    assert found[0, :, VISITS].tolist() == [0.0] * 12
+    assert found[0, :, VISITS + 1].tolist() == (9.0 + TIMES).tolist()
 
 
 def situation(*since: float) -> ConstraintContext:
@@ -96,7 +96,7 @@ def test_every_strategy_visits_in_time(planner: str) -> None:
         times = np.concatenate([[record.times[4]], record.times[near], [record.times[-1]]])
         late.append(float(np.diff(times).max()))
     assert max(late) <= EVERY + 1.0, late  # a visit may fall between two scans
-    assert record.poses[5:, :, CLOCKS:].min(axis=1).max() <= EVERY
+    assert record.poses[5:, :, VISITS:].min(axis=1).max() <= EVERY
 
 
 def test_without_the_constraint_they_are_not_visited() -> None:
@@ -113,7 +113,7 @@ def test_mistakes_are_named() -> None:
     with pytest.raises(InputError, match=r"expected poses of 13 components.*see Patrolling.*got 3"):
         Revisit(PLACES, 3.0, 9.0).courses(ConstraintContext((np.zeros((2, 5, 3)),), TIMES[:5], poses=np.zeros((1, 3))))
     with pytest.raises(InputError, match="pose: expected 13 components"):
-        options_at("platform", Patrolling(Stationary(), PLACES, 3.0), np.zeros(CLOCKS), TIMES)
+        options_at("platform", Patrolling(Stationary(), PLACES, 3.0), np.zeros(VISITS), TIMES)
     twice = [{"kind": "revisit", "places": [[0.0, 0.0]], "radius": 3.0, "every": 9.0}] * 2
     with pytest.raises(ScenarioError, match="one constraint revisit with all places"):
         visited({"control.constraints": twice})

@@ -156,7 +156,7 @@ def test_whole_states_of_other_components_are_refused() -> None:
     flat = replace(truth, states=np.ascontiguousarray(truth.states[:, :3]))
     with pytest.raises(InputError, match=r"components: expected position, as true states have 3 .* estimated ones 4"):
         ospa_of_run(flat, estimates, cutoff=50.0, order=2.0, components="state")
-    with pytest.raises(InputError, match="components: expected position, position_and_height or state; got velocity"):
+    with pytest.raises(InputError, match="components: expected position, state or places in states; got velocity"):
         ospa_of_run(truth, estimates, cutoff=50.0, order=2.0, components="velocity")
 
 

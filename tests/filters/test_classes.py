@@ -188,13 +188,9 @@ def test_faults_are_named() -> None:
     plain, classes = make(DeltaGlmbFilter), make(DeltaGlmbFilter, birth=replace(birth(), class_probs=PROBS))
     with pytest.raises(InputError, match=r"belief: expected 3 classes of targets, as in the birth model; got 0"):
         step(classes, NEAR, plain.initial())
-    with pytest.raises(
-        InputError, match="class ratios of 0 classes, as the targets have; got those of 3"
-    ):
+    with pytest.raises(InputError, match="class ratios of 0 classes, as the targets have; got those of 3"):
         step(plain, with_features(NEAR, ratios(1)))
-    with pytest.raises(
-        InputError, match="class ratios of 3 classes, as the targets have; got those of 2"
-    ):
+    with pytest.raises(InputError, match="class ratios of 3 classes, as the targets have; got those of 2"):
         step(classes, with_features(NEAR, ratios(1, num_classes=2)))
     with pytest.raises(InputError, match=r"class_ratios: expected an array of shape \(1, any\); got shape \(2, 3\)"):
         with_features(NEAR, ratios(2))

@@ -83,7 +83,7 @@ def _vector(rng: Rng, dim: int, spread: float = 200.0) -> list[float]:
 def _motion(rng: Rng, dim: int) -> Data:
     order = pick(rng, [{}, {"state_order": "grouped"}, {"state_order": "interleaved"}])
     if dim == 3:
-        return own_model("motion", state_dim=3)
+        return own_model("motion", components=["px", "py", "own_2"])
     if dim == 5:
         return {"kind": "coordinated_turn", "sigma_v": 1.0, **order}
     return {

@@ -42,7 +42,7 @@ JUNK: list[Any] = [
     *([], [[]], [1, "a"], [1, 2, 3], ["jdm"], [0.0] * 2, [1e300] * 2, [1.0] * 4, [[1.0, 0.0], [0.0, 1.0]]),
     *([1] * 1000, [0.1] * 1000, {}, {"kind": []}, {"kind": "x" * 5000}, {"": {}}, {"": None}, {"x" * 10_000: 1}, _MANY),
     *({"kind": "custom"}, {"kind": "custom", "function": "os:system"}),
-    {"kind": "custom", "function": "own.py:motion", "state_dim": 4},
+    {"kind": "custom", "function": "own.py:motion", "components": ["px", "py", "vx", "vy"]},
 ]
 
 

@@ -41,7 +41,7 @@ pytestmark = pytest.mark.fuzz
 Cases = Callable[[Callable[[np.random.Generator], object], int], None]
 SCANS = 25
 REPORT_EVERY = 12  # cases; a report takes a second
-RUN_CODE = "motion:\n  kind: custom\n  function: {file}:boom\n  state_dim: 4\n"
+RUN_CODE = "motion:\n  kind: custom\n  function: {file}:boom\n  components: [px, py, vx, vy]\n"
 
 
 @dataclass(frozen=True)

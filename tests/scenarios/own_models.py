@@ -86,3 +86,43 @@ measurement = MeasurementModel(1, _distance, np.empty(0))
 noise = NoiseModel(_distance_noise, np.empty(0), 1)
 detection = DetectionModel(_detection, np.empty(0))
 clutter = measurement_space_clutter(3.0, [0.0], [100.0])
+
+
+@model_function("transition")
+def _accelerates(state: Floats, dt: float, params: Floats, out: Floats) -> None:
+    for j in range(state.shape[0]):
+        out[j] = state[j]
+    for axis in range(2):
+        out[axis] += dt * state[axis + 2] + 0.5 * dt * dt * state[axis + 4]
+        out[axis + 2] += dt * state[axis + 4]
+
+
+@model_function("transition_jacobian")
+def _accelerates_jacobian(state: Floats, dt: float, params: Floats, out: Floats) -> None:
+    for i in range(out.shape[0]):
+        for j in range(out.shape[1]):
+            out[i, j] = 1.0 if i == j else 0.0
+    for axis in range(2):
+        out[axis, axis + 2] = out[axis + 2, axis + 4] = dt
+        out[axis, axis + 4] = 0.5 * dt * dt
+
+
+@model_function("process_noise_cov")
+def _shaken(state: Floats, dt: float, params: Floats, out: Floats) -> None:
+    for i in range(out.shape[0]):
+        for j in range(out.shape[1]):
+            out[i, j] = 0.0
+    for j in range(4, out.shape[0]):
+        out[j, j] = dt * params[0] if j < 6 else dt * params[1]
+
+
+def accelerating(*others: str) -> MotionModel:
+    """Constant acceleration; state [px, py, vx, vy, ax, ay], and others that stay as they are."""
+    names = ("px", "py", "vx", "vy", "ax", "ay", *others)
+    functions = _accelerates, _shaken, np.empty(0), np.array([1e-4, 4.0]), _accelerates_jacobian
+    return MotionModel(len(names), *functions, components=names)
+
+
+def accelerating_at_height() -> MotionModel:
+    """Constant acceleration in the plane; state [px, py, vx, vy, ax, ay, pz]."""
+    return accelerating("pz")

@@ -146,7 +146,7 @@ def test_custom_models_from_a_file_next_to_the_scenario() -> None:
     loaded = scenario(
         (
             "{kind: constant_velocity, sigma_v: 1.0}",
-            "{kind: custom, function: 'own_models.py:motion', arguments: {speed: 2.5}, state_dim: 3}",
+            "{kind: custom, function: 'own_models.py:motion', arguments: {speed: 2.5}, components: [px, py, own_2]}",
         ),
         ("{kind: constant, probability: 0.95}", own["survival"]),
         ("mean: [0.0, 0.0, 0.0, 0.0], std: [5.0, 5.0, 2.0, 2.0]", "mean: [0, 0, 0], std: [1, 1, 1]"),
@@ -180,21 +180,24 @@ def test_custom_models_from_a_file_next_to_the_scenario() -> None:
     ],
 )
 def test_models_that_cannot_be_imported(function: str, arguments: str, message: str) -> None:
-    text = f"{{kind: custom, function: '{function}', arguments: {arguments}, state_dim: 4}}"
+    text = f"{{kind: custom, function: '{function}', arguments: {arguments}, components: [px, py, vx, vy]}}"
     loaded = scenario(("{kind: constant_velocity, sigma_v: 1.0}", text))
     with pytest.raises(InputError, match=r"^motion\.function: ") as error:
         filters_of(loaded)
     assert message in str(error.value)
 
 
-def test_a_state_dimension_that_is_not_the_models() -> None:
-    text = "{kind: custom, function: 'own_models.py:motion', state_dim: 4}"
-    with pytest.raises(InputError, match=r"motion\.state_dim: expected that of own_models\.py:motion, 3; got 4"):
+def test_components_that_are_not_the_models() -> None:
+    text = "{kind: custom, function: 'own_models.py:motion', components: [px, py, vx, vy]}"
+    with pytest.raises(
+        InputError,
+        match=r"motion\.components: expected those of own_models\.py:motion, px, py, own_2; got px, py, vx, vy",
+    ):
         filters_of(scenario(("{kind: constant_velocity, sigma_v: 1.0}", text)))
 
 
 def test_a_state_in_another_order_is_refused() -> None:
-    text = "{kind: custom, function: 'own_models.py:height_third', state_dim: 6}"
+    text = "{kind: custom, function: 'own_models.py:height_third', components: [px, py, vx, vy, own_4, own_5]}"
     loaded = scenario(
         ("{kind: constant_velocity, sigma_v: 1.0}", text),
         ("mean: [0.0, 0.0, 0.0, 0.0], std: [5.0, 5.0, 2.0, 2.0]", "mean: [0, 0, 0, 0, 0, 0], std: [1, 1, 1, 1, 1, 1]"),

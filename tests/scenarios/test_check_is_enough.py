@@ -163,7 +163,7 @@ def test_a_custom_model_is_located_but_not_run(
 ) -> None:
     (tmp_path / "own.py").write_text(code)
     file = tmp_path / "scenario.yaml"
-    motion = "{kind: custom, function: 'own.py:motion', state_dim: 4}"
+    motion = "{kind: custom, function: 'own.py:motion', components: [px, py, vx, vy]}"
     file.write_text(changed(("{kind: constant_velocity, sigma_v: 1.0}", motion)))
     if wanted:
         assert wanted in fault(file)
@@ -311,7 +311,7 @@ def test_an_oracle_takes_turn_rates_that_were_not_recorded_as_zero(tmp_path: Pat
 
 
 def test_an_oracle_needs_all_components_of_a_custom_motion(tmp_path: Path) -> None:
-    motion = "{kind: custom, function: 'own_models.py:motion', state_dim: 3}"
+    motion = "{kind: custom, function: 'own_models.py:motion', components: [px, py, own_2]}"
     assert "planners.known.kind: expected another kind, as states have 3 components under motion and" in fault(
         turning(tmp_path, motion, "planners: {known: {kind: oracle}}")
     )

@@ -48,11 +48,11 @@ sigma_v: 1.0 -> sigma_v: -1.0
     9:30: birth.sites[0].mean: expected 5 numbers, as a state under motion has, got a list of 4
     9:57: birth.sites[0].std: expected 5 numbers, as a state under motion has, got a list of 4
     13:15: targets.tracks[0].state: expected 5 numbers, as a state under motion has, got a list of 4
-{kind: constant_velocity, sigma_v: 1.0} -> {kind: custom, function: nowhere, state_dim: 4}
+{kind: constant_velocity, sigma_v: 1.0} -> {kind: custom, function: nowhere, components: [px, py, vx, vy]}
     4:34: motion.function: expected "package.module:attribute" or "file.py:attribute", got "nowhere"
-{kind: constant_velocity, sigma_v: 1.0} -> {kind: custom, function: 'absent.py:motion', state_dim: 4}
+{kind: constant_velocity, sigma_v: 1.0} -> {kind: custom, function: 'absent.py:motion', components: [px, py, vx, vy]}
     4:34: motion.function: expected a file, relative to the scenario file, got "absent.py": no such file
-{kind: constant_velocity, sigma_v: 1.0} -> {kind: custom, function: 'no_such_module_here:motion', state_dim: 4}
+{kind: constant_velocity, sigma_v: 1.0} -> {kind: custom, function: 'no_such_module_here:motion', components: [px, py, vx, vy]}
     4:34: motion.function: expected a module that Python finds, got "no_such_module_here"
 probability: 0.95 -> probability: 95
     5:41: survival.probability: expected a number of at most 1, got 95

@@ -95,7 +95,7 @@ def test_missing_columns(ships: Path, targets: str, fault: str) -> None:
 
 def test_models_cannot_be_imported_from_main(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "typed_at_a_prompt", ModuleType("typed_at_a_prompt"))
-    custom = "{kind: custom, function: 'typed_at_a_prompt:motion', state_dim: 4}"
+    custom = "{kind: custom, function: 'typed_at_a_prompt:motion', components: [px, py, vx, vy]}"
     with pytest.raises(ScenarioError, match=r"motion\.function: expected a module that Python finds"):
         parse_scenario(changed(("{kind: constant_velocity, sigma_v: 1.0}", custom)))
 
@@ -116,7 +116,8 @@ def test_a_kept_copy_still_finds_its_files(ships: Path) -> None:
 
 def test_a_kept_copy_still_finds_its_models(tmp_path: Path) -> None:
     (tmp_path / "own.py").write_text("motion = None", encoding="utf-8")
-    custom = "{kind: custom, function: 'own.py:motion', arguments: {kind: custom, function: 'a.py:b'}, state_dim: 4}"
+    arguments = "{kind: custom, function: 'a.py:b'}"
+    custom = f"{{kind: custom, function: 'own.py:motion', arguments: {arguments}, components: [px, py, vx, vy]}}"
     text = changed(("{kind: constant_velocity, sigma_v: 1.0}", custom))
     motion = parse_scenario(dump_scenario(parse_scenario(text, folder=tmp_path), folder=tmp_path)).motion
     assert motion.model_dump()["function"] == f"{tmp_path.resolve() / 'own.py'}:motion"

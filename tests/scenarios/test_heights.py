@@ -172,7 +172,7 @@ FAULTS = [
 ]
 WANTED = [
     "sensor_defaults.measurement.kind: expected one of bearing_range, bearing_range_rate, bearing_only, range_only, "
-    "position, or motion: constant_velocity_height (as targets have no height); got",
+    "position, or a motion with pz (as targets have px, py, vx, vy); got",
     "noise.sigma_altitude: expected a number above 0, as altitudes are measured; got none",
     "height: expected 0, as a bearing_range measurement does not depend on heights; got 100.0",
     "clutter: expected region, measurement_space or custom clutter for a bearing_range_altitude measurement; got",
@@ -196,4 +196,4 @@ def test_a_recording_with_heights_has_them_in_its_record(tmp_path: Path) -> None
     assert "also in height" in found.assumed["motion"]
     record = track_recording(found.scenario, found.recording)
     assert table_of_run(record, found.scenario)["z_m"]
-    assert load_scenario("paper-a").model.has_heights is False
+    assert "pz" not in load_scenario("paper-a").model.motion.components

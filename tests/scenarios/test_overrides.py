@@ -58,7 +58,7 @@ def test_files_next_to_the_scenario_stay_next_to_it(tmp_path: Path) -> None:
     path = tmp_path / "mine.yaml"
     path.write_text(text)
     loaded = load_scenario(path)
-    custom = {"kind": "custom", "function": "own.py:motion", "state_dim": 4}
+    custom = {"kind": "custom", "function": "own.py:motion", "components": ["px", "py", "vx", "vy"]}
     assert replace_fields(loaded, {"motion": custom}).folder == tmp_path
     with pytest.raises(ScenarioError, match=r"motion\.function: expected a file.*other\.py"):
         replace_fields(loaded, {"motion": {**custom, "function": "other.py:motion"}})

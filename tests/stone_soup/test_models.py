@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import datetime
 import math
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -37,7 +38,13 @@ from stonesoup.types.detection import Detection
 from stonesoup.types.state import GaussianState, State, StateVector, WeightedGaussianState
 
 from vedette.errors import InputError
-from vedette.models import SensorModel, constant_detection, measurement_space_clutter
+from vedette.models import (
+    BirthModel,
+    SensorModel,
+    bearing_slant_range,
+    constant_detection,
+    measurement_space_clutter,
+)
 from vedette.models.functions import write_rows
 from vedette.models.measurement import wrap_periodic
 from vedette.recorded.detections import elements_of
@@ -325,3 +332,14 @@ def test_sensors_may_bring_their_own_clutter_and_detection() -> None:
     assert made.names == ("mast",)
     assert isinstance(made.sensors[0], SensorModel)
     assert (made.sensors[0].detection, made.sensors[0].clutter.rate) == (seen, 3.0)
+
+
+def test_a_sensor_of_heights_needs_a_motion_with_one() -> None:
+    bearing_range = CartesianToBearingRange(6, mapping=(0, 3), noise_covar=np.diag([0.01**2, 25.0]))
+    box = measurement_space_clutter(1.0, [-1.0, 0.0], [1.0, 1e4])
+    found = convert(MOTIONS["acceleration"], [bearing_range], births=BirthModel.none(6), clutter=box)
+    assert found.targets.motion.components == ("px", "py", "vx", "vy", "ax", "ay")
+    (sensor,) = found.sensors
+    of_heights = replace(found, sensors=(replace(sensor, measurement=bearing_slant_range()),))
+    with pytest.raises(InputError, match=r"sensor.measurement: expected a motion with pz .*got .*vy, ax, ay"):
+        of_heights.tracker()

@@ -15,7 +15,7 @@ from scipy.optimize import linear_sum_assignment
 
 from vedette.densities import as_lmb, track_moments
 from vedette.internal.quantities import COMPONENTS, HEIGHT_DEPENDENT, is_position
-from vedette.kernels.base.types import HEIGHT, OWN_HEIGHT, Bools, Floats, Ints
+from vedette.kernels.base.types import CLIMB, HEIGHT, OWN_HEIGHT, STATE_COMPONENTS, VX, VY, Bools, Floats, Ints
 from vedette.models.scan_rows import ScanLike, ScanRows
 from vedette.recorded import RecordedScans, RecordedSensor
 from vedette.recorded.scan_times import with_wrapped_angles
@@ -32,7 +32,8 @@ SCANS_A_PIECE = 5  # scans of the slowest sensor per piece
 _LEAST_PAIRS = 4  # least number of pairs in a piece
 _LEAST_SEEN = 3  # least number of measurements of a target for a sensor to share it with others
 _MAD = 1.4826  # standard deviation of Gaussian numbers over their median absolute value
-_PLACE, _VELOCITY = [0, 1, 4], [2, 3, 5]  # components of a state
+_STATE = STATE_COMPONENTS["constant_velocity_height"]  # components of the states here
+_PLACE, _VELOCITY = [0, 1, _STATE.index(HEIGHT)], [VX, VY, _STATE.index(CLIMB)]
 _BASELINE = 0.03  # distance between sensors, as a share of that of the targets, below which they are at one place
 _POSITION, _SPEED = 1e4, 30.0  # m, m/s: prior that regularises poorly determined pieces
 
@@ -74,17 +75,16 @@ def match_measurements(
         sites: the sensors.
         stds: (num_sensors, MOST_FITTED) standard deviations for gating measurements around tracks.
     """
-    has_heights = any(site.kind in HEIGHT_DEPENDENT for site in sites)
+    components = tracker.targets.motion.components
     rngs = (np.random.default_rng(0),) * len(sites)
     state, rows, numbers = tracker.initial(), list[tuple[float | int, ...]](), dict[tuple[int, ...], int]()
     counts, seen = np.zeros((2, len(sites)), np.int64), list[tuple[int, int]]()
     for time, scans, poses in zip(recording.times.tolist(), recording.scans, recording.poses, strict=True):
         lmb = as_lmb(state.fused)
         sure = lmb.existence > _SURE
-        moments, means = track_moments(lmb.tracks)[0][sure], np.zeros((int(sure.sum()), 6))
-        means[:, :4] = moments[:, :4]
-        if has_heights:
-            means[:, 4:] = moments[:, HEIGHT : HEIGHT + 2]
+        moments, means = track_moments(lmb.tracks)[0][sure], np.zeros((int(sure.sum()), len(_STATE)))
+        for name in set(_STATE).intersection(components):
+            means[:, _STATE.index(name)] = moments[:, components.index(name)]
         if state.time is not None:
             means = _moved(means, np.full(len(means), time - state.time))
         labels = [numbers.setdefault(tuple(label), len(numbers)) for label in lmb.tracks.labels[sure].tolist()]

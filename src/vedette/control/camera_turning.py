@@ -7,11 +7,11 @@ from collections.abc import Sequence
 import numpy as np
 
 from vedette.densities import UndetectedIntensity
-from vedette.kernels.base.types import Bools, Floats
+from vedette.kernels.base.types import HALF_WIDTH, POINTING, Bools, Floats
 from vedette.models.measurement import wrap_angles
 from vedette.platforms import Options
 from vedette.platforms.base import SWITCH
-from vedette.platforms.camera import HALF_WIDTH, POINTING, angle_beyond_view, is_camera
+from vedette.platforms.camera import angle_beyond_view, is_camera
 
 POINTS = "pointing_deg"  # the column of actions with the pointing of a camera
 _ARRIVED = 1e-9  # s

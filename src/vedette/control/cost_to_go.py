@@ -18,10 +18,10 @@ from vedette.control.constraints import Paths, VisibilityGraph
 from vedette.control.extrapolation import extrapolated, walked
 from vedette.control.settings import MobileSensor, PlanningSettings
 from vedette.densities import LMB, UndetectedIntensity
-from vedette.kernels.base.types import Bools, Floats, Ints
+from vedette.kernels.base.types import HALF_WIDTH, HEADING, Bools, Floats, Ints
 from vedette.models.functions import numbers_at
 from vedette.platforms import Options
-from vedette.platforms.camera import HALF_WIDTH, line_of_sight
+from vedette.platforms.camera import line_of_sight
 
 # Minimum existence probability of targets that sensors approach from beyond the horizon.
 _LEAST_EXISTENCE = 0.1
@@ -194,9 +194,9 @@ class CostToGo:
             begin, end = places.reshape(-1, 2), (places + shift).reshape(-1, 2)
             free = paths.graph.free_fraction(begin, end).reshape(share.shape)
             courses[led[:, np.newaxis], after, :2] = places + free[..., np.newaxis] * shift
-            offset = own.courses[led, -1, 2] - np.arctan2(steps[led, 1], steps[led, 0])
+            offset = own.courses[led, -1, HEADING] - np.arctan2(steps[led, 1], steps[led, 0])
             ahead = np.cos(offset) > 1.0 - _SAME_HEADING  # a sensor that heads where it moves does so on its path
-            courses[led[ahead, np.newaxis], after, 2] = headings[ahead]
+            courses[led[ahead, np.newaxis], after, HEADING] = headings[ahead]
         share = np.minimum(rounds[after], open_share[stopped, np.newaxis] * rounds[-1])[..., np.newaxis]
         courses[stopped[:, np.newaxis], after, :2] = ends[stopped, np.newaxis] + share * steps[stopped, np.newaxis]
         return later._replace(courses=courses)

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from vedette.control.camera_turning import turned_on
-from vedette.kernels.base.types import Floats
+from vedette.kernels.base.types import POINTING, Floats
 from vedette.platforms import Options
-from vedette.platforms.camera import POINTING, is_camera
+from vedette.platforms.camera import is_camera
 
 
 def extrapolated(own: Options, horizon: Floats, times: Floats) -> Options:

@@ -16,14 +16,13 @@ from vedette.densities import LabelledDensity
 from vedette.errors import InputError
 from vedette.filters import common_target_model
 from vedette.fusion import Fusion
-from vedette.kernels.base.types import Floats
+from vedette.kernels.base.types import BUDGET, HEADING, POINTING, Floats
 from vedette.kernels.labelled.validity import is_valid_glmb, is_valid_lmb
 from vedette.kernels.planning.ascent import Allowed
 from vedette.models import TargetModel
 from vedette.models.arguments import float_array, instance, reject, sequence, warn_if_degrees
 from vedette.platforms import Options, options_at
-from vedette.platforms.camera import POINTING, is_camera
-from vedette.platforms.operated import LEFT
+from vedette.platforms.camera import is_camera
 from vedette.tracking import State
 
 
@@ -58,8 +57,8 @@ def check_poses(poses: Any, num_sensors: int) -> Floats:
     checked = float_array("poses", poses, (num_sensors, None))
     if checked.shape[1] < 3:
         raise reject("poses", f"an array of shape ({num_sensors}, 3 or more)", f"shape {checked.shape}")
-    for s in np.flatnonzero(np.abs(checked[:, 2]) >= 10.0).tolist():
-        warn_if_degrees(f"poses[{s}]", float(checked[s, 2]))
+    for s in np.flatnonzero(np.abs(checked[:, HEADING]) >= 10.0).tolist():
+        warn_if_degrees(f"poses[{s}]", float(checked[s, HEADING]))
     return checked
 
 
@@ -180,9 +179,9 @@ def stationary_courses(options: Sequence[Options], mask: Mask | None) -> tuple[i
     stationary = []
     for s, own in enumerate(options):
         off = np.abs(own.courses - own.pose)
-        angles = [2, POINTING] if is_camera(own.pose) else [2]
+        angles = [HEADING, POINTING] if is_camera(own.pose) else [HEADING]
         off[:, :, angles] = np.abs(np.remainder(off[:, :, angles] + np.pi, 2.0 * np.pi) - np.pi)
-        rest = np.delete(off[:, :, :LEFT], [0, 1, *angles], axis=2).sum(axis=2)
+        rest = np.delete(off[:, :, :BUDGET], [0, 1, *angles], axis=2).sum(axis=2)
         candidates = np.flatnonzero(single_mask(mask, s, len(off)))
         candidates = candidates if len(candidates) else np.arange(len(off))
         for change in (*(off[:, :, angle] for angle in angles), np.hypot(off[:, :, 0], off[:, :, 1]), rest):

@@ -14,10 +14,9 @@ from vedette.control.plan import Plan
 from vedette.control.search import first_best
 from vedette.control.settings import MobileSensor, PlanningSettings
 from vedette.densities import Estimator, best_estimate
-from vedette.kernels.base.types import Floats, Ints
+from vedette.kernels.base.types import HALF_WIDTH, POINTING, Floats, Ints
 from vedette.models.arguments import dimension, generator, instance, one_of, reject, sequence
 from vedette.platforms import Options
-from vedette.platforms.camera import HALF_WIDTH, POINTING
 from vedette.tracking import State
 
 Rule: TypeAlias = Literal["nearest", "assigned_target", "centroid"]

@@ -2,19 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from vedette.errors import InputError
 from vedette.internal.text import pluralise
-from vedette.kernels.base.types import HEIGHT, Floats, Ints
+from vedette.kernels.base.types import CLIMB, HEIGHT, PLANE, VY, Floats, Ints
 
 _MOST_SHOWN = 3
 _LARGE = 1e7  # m, from which on a position is shown in powers of ten
 _CORNERS, _FAINTEST = 73, 0.15
-_COLUMNS = ("x_m", "y_m", "vx_mps", "vy_mps")
+# Columns of the components of a state.
+_COLUMNS = {"px": "x_m", "py": "y_m", "vx": "vx_mps", "vy": "vy_mps", HEIGHT: "z_m", CLIMB: "vz_mps"}
 
 
 class Target(NamedTuple):
@@ -97,21 +98,19 @@ def indices_or_none(measurements: Ints) -> list[int | None]:
     return [None if index < 0 else index for index in measurements.tolist()]
 
 
-def state_columns(means: Floats, covs: Floats, *, has_height: bool = False) -> dict[str, list[float]]:
-    """Return the columns `x_m`, `y_m`, `vx_mps`, `vy_mps` of states and their stds `std_...`.
+def state_columns(means: Floats, covs: Floats, components: Sequence[str] = ()) -> dict[str, list[float]]:
+    """Return the columns `x_m`, `y_m`, `vx_mps`, `vy_mps`, `z_m`, `vz_mps` of states and their stds `std_...`.
 
     Args:
-        means: (num, state_dim). With four components or more the third and fourth are velocities.
+        means: (num, state_dim).
         covs: (num, state_dim, state_dim).
-        has_height: True if components 4 and 5 are height and vertical velocity: `z_m` and `vz_mps`.
+        components: of the motion. (): position and, with four components or more, velocity.
     """
-    names = _COLUMNS[: 4 if means.shape[1] >= 4 else min(2, means.shape[1])]
-    names = (*names, "z_m", "vz_mps") if has_height and means.shape[1] > HEIGHT + 1 else names
+    names = components or PLANE[: len(PLANE) if means.shape[1] > VY else 2]
+    columns = {_COLUMNS[name]: j for j, name in enumerate(names) if name in _COLUMNS}
     with np.errstate(invalid="ignore"):
         stds = np.sqrt(np.diagonal(covs, axis1=1, axis2=2))
-    return {name: means[:, j].tolist() for j, name in enumerate(names)} | {
-        f"std_{name}": stds[:, j].tolist() for j, name in enumerate(names)
-    }
+    return {f"{of}{name}": x[:, j].tolist() for of, x in (("", means), ("std_", stds)) for name, j in columns.items()}
 
 
 def _place(state: Floats) -> str:

@@ -35,7 +35,7 @@ class Assumed(NamedTuple):
         """Build the models. Raises `InputError` for custom models that cannot be loaded."""
         model, folder = scenario.model, scenario.folder
         region, method, at = model.region.build(), model.filter.gaussian_method, model.filter.detection_at
-        sensors = tuple(each.build(region, method, folder, at) for each in model.sensors)
+        sensors = tuple(each.build(region, method, folder, model.motion.components, at) for each in model.sensors)
         return cls(scenario, sensors, model.motion.build(folder, method=method))
 
 

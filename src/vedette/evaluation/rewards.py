@@ -10,7 +10,7 @@ import numpy as np
 
 from vedette.control.plan import RewardTable
 from vedette.errors import InputError
-from vedette.kernels.base.types import Floats
+from vedette.kernels.base.types import HEADING, Floats
 from vedette.models.measurement import wrap_angles
 from vedette.platforms import Actions
 from vedette.simulation.records import Decision, RunRecord
@@ -160,7 +160,7 @@ def _summed(table_index: int, decisions: Sequence[Decision]) -> tuple[Floats, Fl
 
 def _turn_actions(decision: Decision) -> tuple[Actions, ...]:
     return tuple(
-        _as_turns(actions, pose[2]) for actions, pose in zip(decision.plan.actions, decision.poses, strict=True)
+        _as_turns(actions, pose[HEADING]) for actions, pose in zip(decision.plan.actions, decision.poses, strict=True)
     )
 
 
@@ -178,7 +178,7 @@ def _as_turns(actions: Actions, heading: float) -> Actions:
 
 def _have_equal_headings(decisions: Sequence[Decision]) -> bool:
     """Return True if all sensors had the headings of the first run, up to rounding and full turns."""
-    headings = np.array([each.poses[:, 2] for each in decisions])
+    headings = np.array([each.poses[:, HEADING] for each in decisions])
     return bool(np.abs(wrap_angles(headings - headings[0])).max(initial=0.0) < np.radians(_TOLERANCE))
 
 

@@ -7,6 +7,7 @@ from functools import partial
 from pathlib import Path
 
 from vedette.evaluation.metrics import Metric, RunMetrics, measure, ospa_of_run
+from vedette.kernels.base.types import HEIGHT, place_of
 from vedette.recorded import RecordedScans
 from vedette.scenarios import Scenario, load_scenario
 from vedette.scenarios.build import (
@@ -78,10 +79,11 @@ def track_recording(
 
 def build_score(scenario: Scenario) -> Score | None:
     """Return the OSPA of estimates at each scan as a function, as the scenario defines it. None: unknown targets."""
-    ospa = scenario.model.ospa
+    ospa, places = scenario.model.ospa, [0, 1, place_of(HEIGHT, scenario.model.motion.components)]
     if scenario.model.targets.kind == "unknown":
         return None
-    return partial(ospa_of_run, cutoff=ospa.cutoff, order=ospa.order, components=ospa.components)
+    components = places if ospa.components == "position_and_height" else ospa.components
+    return partial(ospa_of_run, cutoff=ospa.cutoff, order=ospa.order, components=components)
 
 
 def custom_metrics(scenario: Scenario) -> tuple[Metric, ...]:

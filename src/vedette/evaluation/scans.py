@@ -11,7 +11,7 @@ import numpy as np
 
 from vedette.errors import InputError
 from vedette.internal.quantities import COMPONENTS, HEIGHT_DEPENDENT, PLACED, QUANTITIES, is_doppler, si_column
-from vedette.kernels.base.types import BEAM, OWN_HEIGHT, OWN_VELOCITY, Floats
+from vedette.kernels.base.types import BEAM, HEADING, OWN_HEIGHT, OWN_VELOCITY, Floats
 from vedette.models.arguments import reject
 from vedette.models.scan_rows import ScanLike, ScanRows, values_of
 from vedette.models.turns import is_turn, lags
@@ -73,7 +73,7 @@ def scans_of_record(record: RunRecord, scenario: Scenario) -> Scans:
     if model.recording is not None:
         return _recorded(record, model.recording, scenario)
     region, method = model.region.build(), model.filter.gaussian_method
-    sensors = [section.build(region, method, scenario.folder) for section in model.sensors]
+    sensors = [section.build(region, method, scenario.folder, model.motion.components) for section in model.sensors]
     true, times = build_true_sensors(scenario, sensors), build_scan_times(scenario)
     scans_at = scan_flags_of_run(times, scan_loss_probabilities(scenario), record.num_scans, record.seed, record.run)
     return scans_of_sensors(record, len(true), partial(sensors_at_step, true, scans_at))
@@ -148,7 +148,7 @@ def scan_table(record: RunRecord, scenario: Scenario) -> dict[str, list[Any]]:
         for s, (site, scan, pose) in enumerate(zip(sites, scans, poses, strict=True)):
             if scan is None:
                 continue
-            heading = float(course_deg(site.north, pose[2], pose)) if compass else float(pose[2])
+            heading = float(course_deg(site.north, pose[HEADING], pose)) if compass else float(pose[HEADING])
             columns = [names[name] for name in COMPONENTS[site.kind]]
             rows = (site.to_raw(scan.measurements, pose) if compass else scan.measurements).tolist() or [()]
             bearings = bearings_of(scan.measurements, pose, site.kind)

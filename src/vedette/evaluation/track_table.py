@@ -19,6 +19,7 @@ from vedette.evaluation.track_formats import czml, geojson, mcap, utc_text
 from vedette.internal.extras import require_packages
 from vedette.internal.files import write_file
 from vedette.internal.text import spreadsheet_text
+from vedette.kernels.base.types import VY
 from vedette.platforms.compass import Compass, courses_of
 from vedette.recorded import Origin
 from vedette.scenarios import Scenario
@@ -35,7 +36,7 @@ def track_table(
     names: Sequence[str] = (),
     compass: Compass | None = None,
     joins: Sequence[Join] = (),
-    has_height: bool = False,
+    components: Sequence[str] = (),
     classes: Sequence[str] = (),
 ) -> dict[str, list[Any]]:
     """Return the estimates by columns, one row for each.
@@ -43,13 +44,13 @@ def track_table(
     `time_s` is that of the record plus `start`; `utc` if that is since 1970. `label` is `birth step.index`. `track` is
     the first label of its track, different from `label` after a gap that `joins` close. `x_m`, `y_m`, `vx_mps`,
     `vy_mps` are the estimate, `std_...` its standard deviations (velocities only if the state has them: four components
-    or more, with `has_height` also `z_m`, `vz_mps`), `existence` is the existence probability. `lon_deg`, `lat_deg`
+    or more, with `components` also `z_m`, `vz_mps`), `existence` is the existence probability. `lon_deg`, `lat_deg`
     need an origin. `course_deg`, clockwise from true north, and `speed_mps` need a compass. `target` is the name of the
     true target that OSPA's assignment gives it, nearer than `cutoff` (m), or None.
 
     With `classes`, their names, `class` is the most probable one and `prob_...` the probability of each.
 
-    names: of the true targets, by their ids, else `id + 1`. joins: see `vedette.evaluation.joining`.
+    names: of the true targets, by their ids, else `id + 1`. joins: see `evaluation.joining`. components: of the motion.
     """
     matching = match_run(record.truth, record.estimates, cutoff=cutoff, order=1.0)
     matched_targets = dict(
@@ -75,11 +76,11 @@ def track_table(
     table["track"] = [_label(tracks.get(label, label)) for _, label, *_ in rows]
     dim = len(rows[0][2]) if rows else 4
     means, covs = (np.array([row[part] for row in rows]) for part in (2, 3))
-    table |= state_columns(means.reshape(-1, dim), covs.reshape(-1, dim, dim), has_height=has_height)
+    table |= state_columns(means.reshape(-1, dim), covs.reshape(-1, dim, dim), components)
     if origin is not None:
         positions = origin.to_degrees(np.array([row[2][:2] for row in rows]).reshape(-1, 2))
         table["lon_deg"], table["lat_deg"] = positions[:, 0].tolist(), positions[:, 1].tolist()
-    if compass is not None and dim >= 4:
+    if compass is not None and dim > VY:
         courses = courses_of(compass, means.reshape(-1, dim))
         table["course_deg"], table["speed_mps"] = courses[:, 0].tolist(), courses[:, 1].tolist()
     table["existence"] = [row[4] for row in rows]
@@ -105,7 +106,7 @@ def table_of_run(record: RunRecord, scenario: Scenario, joins: Sequence[Join] = 
         names=names,
         compass=model.north() if model.by_compass else None,
         joins=joins,
-        has_height=model.has_heights,
+        components=model.motion.components,
         classes=tuple(model.classes),
     )
 

@@ -11,7 +11,7 @@ import numpy as np
 
 from vedette.evaluation.innovations import Assumed, Compared
 from vedette.internal.text import pluralise
-from vedette.kernels.base.types import Bools, Floats
+from vedette.kernels.base.types import VELOCITY, Bools, Floats
 from vedette.models.sensor import SensorModel
 
 _GATE = 4.0  # standard deviations of the third measurement as predicted from two
@@ -51,7 +51,7 @@ def unexplained_course_warnings(instants: Sequence[Compared], assumed: Assumed) 
     model, warnings = assumed.scenario.model, list[str]()
     if (births := model.birth.from_measurements) is None:
         return ()
-    speed, area = max(births.std[2:4]), model.region.build().area
+    speed, area = max(births.std[VELOCITY]), model.region.build().area
     for s, (name, sensor) in enumerate(zip(model.sensor_names, assumed.sensors, strict=True)):
         if courses := _courses(_unexplained_scans(instants, s, sensor), _SPEED_FACTOR * speed, area):
             warnings.append(_warning(courses, name, instants[0].own[s], speed))

@@ -107,7 +107,7 @@ class SingleSensorFilter(WithBirths):
         limits: caps and thresholds.
 
     Raises:
-        InputError: a part of another kind.
+        InputError: a part of another kind, or a measurement of a component that states do not have.
     """
 
     targets: TargetModel
@@ -116,6 +116,7 @@ class SingleSensorFilter(WithBirths):
 
     def __post_init__(self) -> None:
         check_fields(self)
+        self.sensor.measurement.check_motion("sensor.measurement", self.targets.motion.components)
         object.__setattr__(self, "sensor", with_default_detection_at(self.sensor, self.default_detection_at))
 
     def _inputs_after(

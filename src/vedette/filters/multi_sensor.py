@@ -80,6 +80,7 @@ class MultiSensorFilter(LabelledFilterBase[BeliefT]):
         for s, sensor in enumerate(self.sensors):
             if not isinstance(sensor, SensorModel):
                 raise InputError(f"sensors[{s}]: expected a SensorModel; got {type(sensor).__name__}")
+            sensor.measurement.check_motion(f"sensors[{s}].measurement", self.targets.motion.components)
         at = self.default_detection_at
         object.__setattr__(self, "sensors", tuple(with_default_detection_at(sensor, at) for sensor in self.sensors))
 

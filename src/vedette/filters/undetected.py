@@ -15,7 +15,7 @@ from vedette.filters.inputs import births_of, births_within
 from vedette.filters.limits import Limits
 from vedette.filters.region_births import no_cells, rate_after, region_births, tables_of, without_change
 from vedette.internal.probabilities import expit
-from vedette.kernels.base.types import Floats, Lmb, Mixture
+from vedette.kernels.base.types import VELOCITY, VX, VY, Floats, Lmb, Mixture
 from vedette.kernels.gaussian.components import stacked_mixtures
 from vedette.kernels.steps.undetected import Arrivals, Left, Undetected
 from vedette.models import BirthModel, SensorModel
@@ -113,8 +113,8 @@ def before_scan(
     is_placed = measured is None or sensor.measurement.places is not None
     if measured is not None and is_placed and len(scan):
         std = measured.std
-        if is_turn(pose) and len(std) >= 4:  # a target moves until the beam passes it
-            std = np.concatenate([np.hypot(std[:2], longest_lag(pose) * std[2:4]), std[2:]])
+        if is_turn(pose) and len(std) > VY:  # a target moves until the beam passes it
+            std = np.concatenate([np.hypot(std[:2], longest_lag(pose) * std[VELOCITY]), std[VX:]])
         places = sensor.measurement.states_at(scan, pose, len(std))
     rate = 0.0 if learnt is None else learnt.rate
     tables, marks = tables_of(undetected), none.marks

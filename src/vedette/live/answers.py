@@ -12,31 +12,32 @@ import numpy as np
 from vedette.control import Plan
 from vedette.densities import Estimate
 from vedette.errors import VedetteError
+from vedette.kernels.base.types import CLIMB, HEIGHT, VY
 from vedette.platforms.compass import Compass, courses_of
 from vedette.recorded import Origin
 
 Answer: TypeAlias = dict[str, Any]
+_NAMES = {"px": "x", "py": "y", "vx": "vx", "vy": "vy", HEIGHT: "z", CLIMB: "vz"}  # of the components of a state
 
 
 def track_answers(
-    estimate: Estimate, classes: Sequence[str], origin: Origin | None, compass: Compass | None, *, has_heights: bool
+    estimate: Estimate, classes: Sequence[str], origin: Origin | None, compass: Compass | None, state: Sequence[str]
 ) -> list[Answer]:
-    """Return an entry for each estimated target, with its place in degrees and its course where these are known."""
-    names = ("x", "y", "vx", "vy")[: 4 if estimate.means.shape[1] >= 4 else 2]
-    names = (*names, "z", "vz") if has_heights else names
-    stds = np.sqrt(np.diagonal(estimate.covs, axis1=1, axis2=2))[:, : len(names)]
+    """Return an entry for each estimated target, with place in degrees and course if known. state: of the motion."""
+    places = {_NAMES[name]: place for place, name in enumerate(state) if name in _NAMES}
+    stds = np.sqrt(np.diagonal(estimate.covs, axis1=1, axis2=2))[:, list(places.values())]
     tracks: list[Answer] = []
     for label, mean, std, existence in zip(
         estimate.labels.tolist(), estimate.means.tolist(), stds.tolist(), estimate.existence.tolist(), strict=True
     ):
-        components = dict(zip(names, mean, strict=False))
+        components = {name: mean[place] for name, place in places.items()}
         tracks.append({"label": ".".join(map(str, label)), **components, "std": std, "existence": existence})
     for track, probs in zip(tracks, estimate.class_probs.tolist() if classes else (), strict=False):
         track["classes"] = dict(zip(classes, probs, strict=True))
     if origin is not None and tracks:
         for track, (lon, lat) in zip(tracks, origin.to_degrees(estimate.means[:, :2]).tolist(), strict=True):
             track.update(lon=lon, lat=lat)
-    if compass is not None and len(names) >= 4:
+    if compass is not None and len(state) > VY:
         for track, (course, speed) in zip(tracks, courses_of(compass, estimate.means).tolist(), strict=True):
             track.update(course_deg=course, speed_mps=speed)
     return tracks

@@ -13,7 +13,7 @@ from vedette.densities import Estimator
 from vedette.errors import VedetteError
 from vedette.evaluation.innovations import Assumed
 from vedette.evaluation.track_formats import utc_text
-from vedette.internal.quantities import HEIGHT_DEPENDENT, PLACED
+from vedette.internal.quantities import PLACED
 from vedette.kernels.base.types import Floats
 from vedette.live.answers import Answer, plan_answer, track_answers
 from vedette.live.fit import LiveFit
@@ -221,8 +221,8 @@ class LiveLoop:
         belief = timeline.state
         assert belief.time is not None  # a scan was taken, or one before it
         estimate = self.estimate(belief.fused, belief.step)
-        has_heights = any(site.kind in HEIGHT_DEPENDENT for site in self.sites)
-        tracks = track_answers(estimate, self.classes, self.origin, self.compass, has_heights=has_heights)
+        state_components = self.tracker.tracker.targets.motion.components
+        tracks = track_answers(estimate, self.classes, self.origin, self.compass, state_components)
         counts = {"late": timeline.num_late, "dropped": timeline.num_dropped, "repeated": timeline.num_repeated}
         return {"line": state.num_lines, **self._line_time(state, belief.time), "tracks": tracks, **counts}
 

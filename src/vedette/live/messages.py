@@ -13,7 +13,7 @@ from vedette.errors import InputError
 from vedette.internal.quantities import COMPONENTS, HEIGHT_DEPENDENT, is_doppler
 from vedette.internal.reading import error_summary, parse_json
 from vedette.internal.text import pluralise, shown
-from vedette.kernels.base.types import BEAM, OWN_VELOCITY, Floats
+from vedette.kernels.base.types import BEAM, HEADING, OWN_VELOCITY, Floats
 from vedette.models.arguments import reject
 from vedette.models.pose_noise import pose_stds_of
 from vedette.models.scan_rows import ScanLike
@@ -108,11 +108,11 @@ def read_message(
         origin,
     )
     pose_vector = scans_read.poses[0, 0].copy()
-    pose_vector[3 : 3 + len(more_components)] = more_components
+    pose_vector[HEADING + 1 : HEADING + 1 + len(more_components)] = more_components
     if "velocity.x" in pose and len(pose_vector) >= BEAM:  # rows have a velocity for range rates only
         pose_vector[OWN_VELOCITY:BEAM] = pose["velocity.x"], pose["velocity.y"]
     if course is not None and origin is not None:  # a position in degrees needed an origin
-        pose_vector[2] = origin.angle(math.radians(course), pose_vector)
+        pose_vector[HEADING] = origin.angle(math.radians(course), pose_vector)
     scan = scans_read.scans[0][0]
     if "times" in data and scan is not None:
         lags = _lags(data["times"], f"{place}, times", len(rows), scans_read.start, scans_read.is_utc)

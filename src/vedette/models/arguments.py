@@ -17,7 +17,7 @@ from vedette.errors import InputError
 from vedette.internal.covariances import covariance_fault
 from vedette.internal.text import plain, printable
 from vedette.internal.unit_warnings import warn_implausible
-from vedette.kernels.base.types import Floats
+from vedette.kernels.base.types import HEADING, Floats
 
 _MAX_COUNT = 2**62
 _MOST_STATE_DIMENSIONS = 10_000
@@ -233,8 +233,8 @@ def pose_vector(field: str, values: Any) -> Floats:
     pose = float_array(field, values, (None,))
     if len(pose) < 3:
         raise reject(field, "an array of shape (3 or more,)", f"shape {pose.shape}")
-    if abs(pose[2]) >= 10.0:
-        warn_if_degrees(field, float(pose[2]))
+    if abs(pose[HEADING]) >= 10.0:
+        warn_if_degrees(field, float(pose[HEADING]))
     return pose
 
 

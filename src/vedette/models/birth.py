@@ -8,7 +8,7 @@ from typing import Literal
 
 import numpy as np
 
-from vedette.kernels.base.types import Floats, Marks
+from vedette.kernels.base.types import VX, VY, Floats, Marks
 from vedette.kernels.gaussian.marks import unmarked
 from vedette.models.arguments import float_array, instance, no_gaussians, positive, positive_definite, reject
 from vedette.models.fields import Chance, check_fields
@@ -76,7 +76,7 @@ class MeasurementBirth:
         if self.region is None:
             return None
         grid = CellGrid(self.region, cells_a_side, cells_a_side)
-        speed = float(self.std[2]) if len(self.std) > 2 else 0.0
+        speed = float(self.std[VX]) if len(self.std) > VY else 0.0
         if self.is_learnt:
             return UndetectedModel(grid, 1.0, birth_rate=LEARNT, speed=speed)
         return UndetectedModel(grid, 0.0, speed=speed)

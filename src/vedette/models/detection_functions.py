@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from vedette.kernels.base.compile import kernel
-from vedette.kernels.base.types import Floats
+from vedette.kernels.base.types import HALF_WIDTH, HEADING, POINTING, Floats
 from vedette.kernels.gaussian.beam import offset_at_beam
 from vedette.kernels.gaussian.position_integrals import gaussian_mean, share_in_sector
 from vedette.kernels.gaussian.scratch import wrap_angle
@@ -73,7 +73,7 @@ def _in_sector(dx: float, dy: float, max_range: float, middle: float, half_width
 def limited_sector(state: Floats, pose: Floats, params: Floats) -> float:
     """params: probability, max_range, half_width_rad, outside."""
     dx, dy = offset_at_beam(state, pose)
-    in_view = _in_sector(dx, dy, params[1], pose[2], params[2])
+    in_view = _in_sector(dx, dy, params[1], pose[HEADING], params[2])
     return params[0] if in_view else params[3]  # type: ignore[no-any-return]
 
 
@@ -81,7 +81,7 @@ def limited_sector(state: Floats, pose: Floats, params: Floats) -> float:
 def mean_limited_sector(mean: Floats, cov: Floats, pose: Floats, params: Floats) -> float:
     """params: as in `limited_sector`."""
     dx, dy = offset_at_beam(mean, pose)
-    share = share_in_sector(dx, dy, cov, params[1], pose[2], params[2])
+    share = share_in_sector(dx, dy, cov, params[1], pose[HEADING], params[2])
     return params[3] + (params[0] - params[3]) * share  # type: ignore[no-any-return]
 
 
@@ -100,7 +100,7 @@ def soft_sector(state: Floats, pose: Floats, params: Floats) -> float:
     if distance == 0.0 or (params[2] >= math.pi and params[4] == 0.0):  # no angular edge
         off = 0.0
     else:
-        off = abs(wrap_angle(math.atan2(dy, dx) - pose[2]))
+        off = abs(wrap_angle(math.atan2(dy, dx) - pose[HEADING]))
     beyond = off - params[2]
     if (params[5] > 0.0 or params[4] == 0.0) and beyond > 0.0:
         return 0.0
@@ -113,7 +113,7 @@ def _reach(pose: Floats, params: Floats) -> float:
     """Return the range of a camera: with a narrower field of view, the same pixels see farther."""
     if len(pose) < 5:
         raise ValueError("camera: expected a pose with pointing_rad and half_width_rad")
-    return params[1] * params[2] / pose[4] if params[2] > 0.0 and pose[4] > 0.0 else params[1]  # type: ignore[no-any-return]
+    return params[1] * params[2] / pose[HALF_WIDTH] if params[2] > 0.0 and pose[HALF_WIDTH] > 0.0 else params[1]  # type: ignore[no-any-return]
 
 
 @model_function("prob_detection")
@@ -121,7 +121,7 @@ def camera(state: Floats, pose: Floats, params: Floats) -> float:
     """params: probability, max_range, reference half width (0: none)."""
     reach = _reach(pose, params)
     dx, dy = offset_at_beam(state, pose)
-    in_view = _in_sector(dx, dy, reach, pose[3], pose[4])
+    in_view = _in_sector(dx, dy, reach, pose[POINTING], pose[HALF_WIDTH])
     return params[0] if in_view else 0.0
 
 
@@ -129,7 +129,7 @@ def camera(state: Floats, pose: Floats, params: Floats) -> float:
 def mean_camera(mean: Floats, cov: Floats, pose: Floats, params: Floats) -> float:
     """params: as in `camera`."""
     reach = _reach(pose, params)
-    if not pose[4] > 0.0:
+    if not pose[HALF_WIDTH] > 0.0:
         return 0.0
     dx, dy = offset_at_beam(mean, pose)
-    return params[0] * share_in_sector(dx, dy, cov, reach, pose[3], pose[4])  # type: ignore[no-any-return]
+    return params[0] * share_in_sector(dx, dy, cov, reach, pose[POINTING], pose[HALF_WIDTH])  # type: ignore[no-any-return]

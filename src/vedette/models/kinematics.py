@@ -12,7 +12,7 @@ from typing import Literal
 import numpy as np
 
 from vedette.kernels.base.compile import inlined, kernel
-from vedette.kernels.base.types import Floats
+from vedette.kernels.base.types import STATE_COMPONENTS, Floats
 from vedette.models.arguments import non_negative, one_of
 from vedette.models.fields import NonNegative, part
 from vedette.models.functions import model_function
@@ -151,7 +151,7 @@ def constant_velocity_height(
     """
     params = np.array([non_negative("sigma_v", sigma_v), non_negative("sigma_climb", sigma_climb)])
     functions = _cv_height_transition, _cv_height_noise, np.empty(0), params, _cv_height_jacobian
-    return MotionModel(6, *functions, method)
+    return MotionModel(6, *functions, method, STATE_COMPONENTS["constant_velocity_height"])
 
 
 @kernel
@@ -241,4 +241,5 @@ def coordinated_turn(
         method: Gaussian method, see `MotionModel`.
     """
     params = np.array([non_negative("sigma_v", sigma_v), non_negative("sigma_turn_rate", sigma_turn_rate)])
-    return MotionModel(5, _ct_transition, _ct_noise, np.empty(0), params, _ct_jacobian, method)
+    functions = _ct_transition, _ct_noise, np.empty(0), params, _ct_jacobian
+    return MotionModel(5, *functions, method, STATE_COMPONENTS["coordinated_turn"])

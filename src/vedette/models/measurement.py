@@ -10,8 +10,8 @@ from numpy.typing import ArrayLike
 
 from vedette.errors import ModelError
 from vedette.internal.quantities import QUANTITIES
-from vedette.kernels.base.types import HEIGHT, Bools, Floats
-from vedette.kernels.gaussian.beam import passage, to_scan_time, turns
+from vedette.kernels.base.types import HEIGHT, VX, VY, Bools, Floats, place_of
+from vedette.kernels.gaussian.beam import LEVEL, passage, to_scan_time, turns
 from vedette.kernels.gaussian.scans import wrap_columns
 from vedette.kernels.gaussian.scratch import FULL_TURN
 from vedette.models.arguments import dimension, float_array, params_vector, pose_vector, reject, state_table
@@ -23,9 +23,9 @@ from vedette.models.probe import probe_array, probe_covariance, probe_jacobian
 @model_function("measurement")
 def _position(state: Floats, pose: Floats, params: Floats, out: Floats) -> None:
     out[0], out[1] = state[0], state[1]
-    if turns(pose) and state.shape[0] >= 4:
+    if turns(pose) and state.shape[0] > VY:
         at = passage(state, pose)
-        out[0], out[1] = state[0] + state[2] * at.lag, state[1] + state[3] * at.lag
+        out[0], out[1] = state[0] + state[VX] * at.lag, state[1] + state[VY] * at.lag
 
 
 @model_function("measurement_jacobian")
@@ -33,8 +33,8 @@ def _position_jacobian(state: Floats, pose: Floats, params: Floats, out: Floats)
     for i in range(2):
         for j in range(out.shape[1]):
             out[i, j] = 1.0 if i == j else 0.0
-    if turns(pose) and state.shape[0] >= 4:
-        to_scan_time(passage(state, pose), pose, True, 0.0, out)
+    if turns(pose) and state.shape[0] > VY:
+        to_scan_time(passage(state, pose), pose, True, LEVEL, out)
 
 
 def _places(measurements: Floats, pose: Floats) -> Floats:
@@ -92,12 +92,14 @@ class MeasurementModel:
             of a Doppler radar. Residuals are wrapped to half of it either way. inf: it does not repeat. () means 2 pi
             for angles, inf for others.
         places: plain function of (n, meas_dim) measurements and a pose: the (n, 2) positions of the targets in m, or
-            (n, 3) with heights for states [px, py, vx, vy, pz, vz]. None if a measurement determines no position.
-            Births from measurements need it.
+            (n, 3) with heights if states have them. None if a measurement determines no position. Births from
+            measurements need it.
         is_linear: True if measurements are linear in the state: a Jacobian is then exact for Gaussians of any width.
         components: name of the quantity of each component, such as "bearing", "range", "range_rate", "x" or "y" (the
             names of `vedette.internal.quantities.QUANTITIES`, which are also fields of `Bias`). () for other
             quantities.
+        state_components: names of components of states, as in `MotionModel.components`, if the function reads more than
+            position and velocity. Filters refuse motions without these components in these places.
 
     Raises:
         InputError: a function of another kind, a bad dimension or parameter, a wrong number of angular flags, an
@@ -114,6 +116,7 @@ class MeasurementModel:
     is_linear: bool = False
     components: tuple[str, ...] = ()
     periods: Floats = field(default_factory=lambda: np.empty(0))
+    state_components: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         dimension("MeasurementModel.meas_dim", self.meas_dim)
@@ -142,6 +145,18 @@ class MeasurementModel:
             raise reject("MeasurementModel.periods", wanted, periods.tolist())
         object.__setattr__(self, "periods", periods)
 
+    @property
+    def height(self) -> int:
+        """Place in states of the height that the measurement depends on, or -1."""
+        return place_of(HEIGHT, self.state_components)
+
+    def check_motion(self, field: str, components: Sequence[str]) -> None:
+        """Raise `InputError` for a motion without a component that the function reads. field: of this model."""
+        for place, name in enumerate(self.state_components):
+            if place_of(name, components) != place:
+                wanted = f"a motion with {name} as component {place}, or a model for the components of the motion"
+                raise reject(field, wanted, ", ".join(components))
+
     def measure(self, states: ArrayLike, pose: ArrayLike) -> Floats:
         """Return the noise-free measurements of (n, state_dim) states, (n, meas_dim).
 
@@ -167,8 +182,8 @@ class MeasurementModel:
         located = self._located(measurements, pose)
         states = np.zeros((len(located), state_dim))
         states[:, :2] = located[:, :2]
-        if located.shape[1] > 2 and state_dim > HEIGHT:
-            states[:, HEIGHT] = located[:, 2]
+        if located.shape[1] > 2 and self.height >= 0:
+            states[:, self.height] = located[:, 2]
         return states
 
     def _located(self, measurements: Floats, pose: ArrayLike) -> Floats:

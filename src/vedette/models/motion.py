@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from vedette.errors import ModelError
-from vedette.kernels.base.types import Floats, Motion
+from vedette.kernels.base.types import PLANE, VELOCITY, VX, VY, Floats, Motion
 from vedette.kernels.gaussian.sigma_points import CUBATURE, LINEARISED, SWITCHED, UNSCENTED
 from vedette.models.arguments import dimension, one_of, params_vector, positive, probability, real, reject, state_table
 from vedette.models.fields import Positive, Probability, part
@@ -49,15 +49,18 @@ class MotionModel:
     """Markov motion of one target over any time step (paper: the transition density f(x_k | x_k-1)).
 
     Attributes:
-        state_dim: length of the state: state[0:2] is the position in m, state[2:4] if it exists the velocity.
+        state_dim: length of the state.
         transition: model function of kind `transition`.
         process_noise_cov: model function of kind `process_noise_cov`.
         transition_params, noise_params: parameter vectors of the two functions. Anything array-like is converted.
         transition_jacobian: model function of kind `transition_jacobian`, or None.
         method: "auto" (EKF if there is a Jacobian, else UKF), "ekf", "ukf" or "ckf".
+        components: names of the components of the state: px and py, in a state of four or more then vx and vy, and in
+            any order the height pz, the vertical velocity vz, an acceleration ax, ay, a turn rate turn_rate, or custom
+            names. (): all components behind position and velocity are custom.
 
     Raises:
-        InputError: a function of another kind, a bad dimension or parameter, "ekf" without a Jacobian.
+        InputError: a function of another kind, a bad dimension, parameter or name, "ekf" without a Jacobian.
     """
 
     state_dim: int
@@ -67,9 +70,15 @@ class MotionModel:
     noise_params: Floats = field(default_factory=lambda: np.empty(0))
     transition_jacobian: ModelFunction | None = None
     method: str = "auto"
+    components: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
-        dimension("MotionModel.state_dim", self.state_dim)
+        dim = dimension("MotionModel.state_dim", self.state_dim)
+        begin = PLANE[: len(PLANE) if dim > VY else 2]
+        names = tuple(self.components) or (*begin, *(f"own_{i}" for i in range(len(begin), dim)))
+        if len(set(names)) < len(names) or len(names) != dim or names[: len(begin)] != begin:
+            raise reject("MotionModel.components", f"{dim} different names, first {', '.join(begin)}", self.components)
+        object.__setattr__(self, "components", names)
         require_kind("MotionModel.transition", self.transition, "transition")
         require_kind("MotionModel.process_noise_cov", self.process_noise_cov, "process_noise_cov")
         if self.transition_jacobian is not None:
@@ -105,24 +114,22 @@ class MotionModel:
         return out
 
     def velocity_fault(self) -> str | None:
-        """Return in words why components 2 and 3 are not the velocity along x and y. None if they are, or do not exist.
+        """Return in words why the velocity is not behind the position. None if it is, or does not exist.
 
-        Births, regions and outputs take them for it: in a state [x, vx, y, vy] they would read y as a velocity. Raises
-        `ModelError` if the transition function does.
+        Births, regions and outputs take these components for it. In a state [x, vx, y, vy] they would read y as a
+        velocity. Raises `ModelError` if the transition function does.
         """
-        if self.state_dim < 4:
+        if self.state_dim <= VY:
             return None  # without velocities
         states = np.zeros((3, self.state_dim))
-        states[:, :4] = 100.0, 200.0, 30.0, 40.0
-        states[1, 2] += 1.0
-        states[2, 3] += 1.0
+        states[:, :2], states[:, VELOCITY] = (100.0, 200.0), (30.0, 40.0)
+        states[1:, VELOCITY] += np.eye(2)
         places = self.propagate(states, _BRIEF)[:, :2]
         for axis, moved in enumerate(places[1:] - places[0]):
             if moved[axis] <= 10.0 * abs(moved[1 - axis]):  # not if one is NaN, which is another fault
                 x, y = moved / _BRIEF
-                return (
-                    f"component {axis + 2}, of which 1 more moves a target by {x:g} m/s along x and {y:g} m/s along y"
-                )
+                by = f"{x:g} m/s along x and {y:g} m/s along y"
+                return f"component {VX + axis}, of which 1 more moves a target by {by}"
         return None
 
     def check(self, states: ArrayLike, dt: float = 1.0) -> None:
@@ -139,8 +146,7 @@ class MotionModel:
             probe_covariance(self.process_noise_cov, (state, dt, self.noise_params), self.state_dim, definite=False)
             if self.transition_jacobian is not None:
                 probe_jacobian(self.transition_jacobian, self.transition, args, shape, False)
-        fault = self.velocity_fault()
-        if fault is not None:
+        if (fault := self.velocity_fault()) is not None:
             raise ModelError(f"motion: expected a state {STATE_ORDER}; got {fault}")
 
 

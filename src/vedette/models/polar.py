@@ -14,8 +14,8 @@ import math
 import numpy as np
 
 from vedette.kernels.base.compile import inlined
-from vedette.kernels.base.types import OWN_VELOCITY, Floats
-from vedette.kernels.gaussian.beam import offset_at_beam, passage, to_scan_time
+from vedette.kernels.base.types import OWN_VELOCITY, VX, VY, Floats
+from vedette.kernels.gaussian.beam import LEVEL, offset_at_beam, passage, to_scan_time
 from vedette.kernels.gaussian.scratch import FULL_TURN
 from vedette.models.arguments import positive
 from vedette.models.fields import Positive, part
@@ -56,14 +56,14 @@ def _bearing_range_jacobian(state: Floats, pose: Floats, params: Floats, out: Fl
     at = passage(state, pose)
     _bearing_row(at.dx, at.dy, out, 0)
     _range_row(at.dx, at.dy, out, 1)
-    to_scan_time(at, pose, False, 0.0, out)
+    to_scan_time(at, pose, False, LEVEL, out)
 
 
 @inlined
 def _relative_velocity(state: Floats, pose: Floats) -> tuple[float, float]:
     if pose.shape[0] < OWN_VELOCITY + 2:
-        return state[2], state[3]
-    return state[2] - pose[OWN_VELOCITY], state[3] - pose[OWN_VELOCITY + 1]
+        return state[VX], state[VY]
+    return state[VX] - pose[OWN_VELOCITY], state[VY] - pose[OWN_VELOCITY + 1]
 
 
 @model_function("measurement")
@@ -89,8 +89,8 @@ def _bearing_range_rate_jacobian(state: Floats, pose: Floats, params: Floats, ou
     for j in range(out.shape[1]):
         out[2, j] = 0.0
     out[2, 0], out[2, 1] = -turning * out[1, 1], turning * out[1, 0]
-    out[2, 2], out[2, 3] = out[1, 0], out[1, 1]
-    to_scan_time(at, pose, False, 0.0, out)
+    out[2, VX], out[2, VY] = out[1, 0], out[1, 1]
+    to_scan_time(at, pose, False, LEVEL, out)
 
 
 @model_function("measurement")
@@ -103,7 +103,7 @@ def _bearing(state: Floats, pose: Floats, params: Floats, out: Floats) -> None:
 def _bearing_jacobian(state: Floats, pose: Floats, params: Floats, out: Floats) -> None:
     at = passage(state, pose)
     _bearing_row(at.dx, at.dy, out, 0)
-    to_scan_time(at, pose, False, 0.0, out)
+    to_scan_time(at, pose, False, LEVEL, out)
 
 
 @model_function("measurement")
@@ -116,7 +116,7 @@ def _range(state: Floats, pose: Floats, params: Floats, out: Floats) -> None:
 def _range_jacobian(state: Floats, pose: Floats, params: Floats, out: Floats) -> None:
     at = passage(state, pose)
     _range_row(at.dx, at.dy, out, 0)
-    to_scan_time(at, pose, False, 0.0, out)
+    to_scan_time(at, pose, False, LEVEL, out)
 
 
 def _places(measurements: Floats, pose: Floats) -> Floats:

@@ -13,7 +13,7 @@ import numpy as np
 
 from vedette.internal.quantities import HEIGHT_DEPENDENT
 from vedette.kernels.base.compile import inlined, kernel
-from vedette.kernels.base.types import HEIGHT, Floats
+from vedette.kernels.base.types import Floats
 from vedette.kernels.gaussian.beam import own_height, own_place
 from vedette.models.arguments import non_negative, one_of, reject
 from vedette.models.clutter import (
@@ -206,8 +206,8 @@ class _RegionSampler:
         num_clutter = int(rng.poisson(self.rate))
         states = np.zeros((num_clutter, state_dim))
         states[:, :2] = self.region.sample(num_clutter, rng=rng)
-        if self.kind in HEIGHT_DEPENDENT:
-            states[:, HEIGHT] = rng.uniform(0.0, self.largest, num_clutter)
+        if self.kind in HEIGHT_DEPENDENT and measurement.height >= 0:
+            states[:, measurement.height] = rng.uniform(0.0, self.largest, num_clutter)
         drawn = np.empty((num_clutter, measurement.meas_dim))
         write_rows(measurement.function, states, pose, measurement.params, drawn)
         return with_rates(drawn, self.kind, self.largest, rng)

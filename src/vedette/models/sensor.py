@@ -174,6 +174,7 @@ def _bundle_of(model: SensorModel, rule: int) -> Sensor:
         model.clutter.params,
         model.measurement.periods,
         resolve_method("SensorModel.method", model.method, jacobian is not None, bends=not model.measurement.is_linear),
+        model.measurement.height,
         rule,
         _NO_NODES if rule == AT_CENTRE else _NODES,
     )

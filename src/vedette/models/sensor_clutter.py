@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from vedette.kernels.base.compile import inlined, kernel
-from vedette.kernels.base.types import Floats
+from vedette.kernels.base.types import HEADING, Floats
 from vedette.kernels.gaussian.scratch import wrap_angle
 from vedette.models.arguments import non_negative, one_of, positive, reject
 from vedette.models.clutter import (
@@ -60,7 +60,7 @@ def _log_density(dx: float, dy: float, heading: float, params: Floats) -> float:
 def _position(measurement: Floats, pose: Floats, params: Floats) -> float:
     dx = measurement[0] + params[5] - (pose[0] + params[8])
     dy = measurement[1] + params[6] - (pose[1] + params[9])
-    return _log_density(dx, dy, pose[2], params)
+    return _log_density(dx, dy, pose[HEADING], params)
 
 
 @inlined
@@ -69,7 +69,7 @@ def _at_range(measurement: Floats, pose: Floats, params: Floats) -> float:
     if not distance > 0.0:
         return -math.inf
     dx, dy = distance * math.cos(bearing), distance * math.sin(bearing)
-    return _log_density(dx, dy, pose[2], params) + math.log(distance)
+    return _log_density(dx, dy, pose[HEADING], params) + math.log(distance)
 
 
 @model_function("log_clutter_intensity")
@@ -101,7 +101,7 @@ class _AroundSampler:
     def __call__(
         self, pose: Floats, measurement: MeasurementModel, *, state_dim: int, rng: np.random.Generator
     ) -> Floats:
-        num_clutter, heading = int(rng.poisson(self.rate)), float(pose[2])
+        num_clutter, heading = int(rng.poisson(self.rate)), float(pose[HEADING])
         share = rng.uniform(size=(num_clutter, 2))
         angles = heading + self.half_width * (2.0 * share[:, 0] - 1.0)
         reach = np.full(num_clutter, self.size)

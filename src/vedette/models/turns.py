@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from vedette.kernels.base.types import BEAM, OWN_VELOCITY, Floats
+from vedette.kernels.base.types import BEAM, OWN_VELOCITY, TURN_RATE, Floats
 from vedette.models.arguments import float_array, pose_vector
 from vedette.models.fields import Positive, check_fields
 
@@ -59,7 +59,7 @@ def with_beam(pose: ArrayLike, velocity: ArrayLike, bearing: float, rate: float)
 
 def is_turn(poses: Floats) -> bool:
     """Return True if a pose, or any of several, shape (..., pose_dim), is that of a scan of one turn of the beam."""
-    return poses.shape[-1] > BEAM + 1 and bool(np.any(poses[..., BEAM + 1]))
+    return poses.shape[-1] > TURN_RATE and bool(np.any(poses[..., TURN_RATE]))
 
 
 def lags(bearings: Floats, pose: Floats) -> Floats:
@@ -67,12 +67,12 @@ def lags(bearings: Floats, pose: Floats) -> Floats:
     if not is_turn(pose):
         return np.zeros(len(bearings))
     off = np.remainder(bearings - pose[BEAM] + math.pi, 2.0 * math.pi) - math.pi
-    return np.asarray(off / pose[BEAM + 1])
+    return np.asarray(off / pose[TURN_RATE])
 
 
 def longest_lag(pose: Floats) -> float:
     """Return half the time of a turn, s, or 0 without a turn."""
-    return math.pi / abs(float(pose[BEAM + 1])) if is_turn(pose) else 0.0
+    return math.pi / abs(float(pose[TURN_RATE])) if is_turn(pose) else 0.0
 
 
 def own_places(bearings: Floats, pose: Floats) -> Floats:

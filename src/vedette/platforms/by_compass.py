@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from vedette.kernels.base.types import Bools, Floats
+from vedette.kernels.base.types import HEADING, Bools, Floats
 from vedette.models.arguments import instance
 from vedette.platforms.base import Platform, actions_at, check_platform, courses_of, scans_of
 from vedette.platforms.camera import MountedPlatform, Pointing
@@ -145,7 +145,7 @@ def _under_way(part: Platform, rows: Floats, pose: Floats, compass: Compass) -> 
     poses = courses_of("platform", part, pose, rows, np.array([_AT_ONCE]))[:, 0]
     away = np.hypot(*(poses[:, :2] - pose[:2]).T) / _AT_ONCE
     speeds = np.round(away, 6)  # at coordinates of a million m there are no more digits
-    return np.column_stack([np.where(speeds > 0.0, _course(compass, poses[:, 2], pose), 0.0), speeds])
+    return np.column_stack([np.where(speeds > 0.0, _course(compass, poses[:, HEADING], pose), 0.0), speeds])
 
 
 def _own(part: Platform, actions: Floats, pose: Floats, compass: Compass) -> Floats:

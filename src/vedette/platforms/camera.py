@@ -9,16 +9,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from vedette.errors import InputError
-from vedette.kernels.base.types import Bools, Floats
+from vedette.kernels.base.types import BUDGET, HALF_WIDTH, HEADING, POINTING, Bools, Floats
 from vedette.models.arguments import float_array, positive, reject
 from vedette.models.fields import Positive
 from vedette.models.measurement import wrap_angles
 from vedette.platforms.base import Platform, check_platform, prices_of, scans_of
 
-POSE_DIM = 5
 _ARRIVED = 1e-9  # rad, pointing error at which a turn is complete
-# Component of the pose; sensors other than cameras have no half width, or one of 0.
-POINTING, HALF_WIDTH = 3, 4
 
 
 def is_camera(pose: Floats) -> bool:
@@ -28,7 +25,7 @@ def is_camera(pose: Floats) -> bool:
 
 def line_of_sight(pose: Floats) -> float:
     """Return the direction in rad that a sensor looks in: the pointing of a camera, the heading of any other sensor."""
-    return float(pose[POINTING] if is_camera(pose) else pose[2])
+    return float(pose[POINTING] if is_camera(pose) else pose[HEADING])
 
 
 def angle_beyond_view(poses: Floats, places: Floats) -> Floats:
@@ -124,8 +121,8 @@ class Pointing:
 
 
 def _check(pose: Floats) -> None:
-    if len(pose) < POSE_DIM:
-        raise InputError(f"pose: expected {POSE_DIM} components, with pointing_rad and half_width_rad; got {len(pose)}")
+    if len(pose) < BUDGET:
+        raise InputError(f"pose: expected {BUDGET} components, with pointing_rad and half_width_rad; got {len(pose)}")
     if not 0.0 < pose[HALF_WIDTH] <= math.pi:
         raise InputError(f"pose: expected half_width_rad in (0, pi]; got {pose[HALF_WIDTH]:g} (is it in degrees?)")
 

@@ -13,7 +13,7 @@ from typing import Protocol, runtime_checkable
 import numpy as np
 from numpy.typing import ArrayLike
 
-from vedette.kernels.base.types import Floats
+from vedette.kernels.base.types import VX, VY, Floats
 
 
 @runtime_checkable
@@ -58,5 +58,5 @@ def course_deg(compass: Compass, angle: ArrayLike, place: ArrayLike) -> Floats:
 
 def courses_of(compass: Compass, states: Floats) -> Floats:
     """Return (num, 2) course, deg in [0, 360), and speed, m/s, of states [px, py, vx, vy, ...] of targets."""
-    courses = [course_deg(compass, math.atan2(state[3], state[2]), state) for state in states.tolist()]
-    return np.column_stack([np.array(courses).reshape(-1), np.hypot(states[:, 2], states[:, 3])])
+    courses = [course_deg(compass, math.atan2(state[VY], state[VX]), state) for state in states.tolist()]
+    return np.column_stack([np.array(courses).reshape(-1), np.hypot(states[:, VX], states[:, VY])])

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from vedette.kernels.base.types import Floats
+from vedette.kernels.base.types import HEADING, Floats
 from vedette.models.arguments import float_array, reject
 from vedette.models.measurement import wrap_angles
 
@@ -53,7 +53,7 @@ class HeadingPlatform:
         """Return (num_actions, num_columns) absolute headings, each at every speed. 180 and -180 remain distinct."""
         degrees = np.array(self.headings_deg)
         if self.relative:
-            degrees = np.degrees(wrap_angles(pose[2] + np.radians(degrees)))
+            degrees = np.degrees(wrap_angles(pose[HEADING] + np.radians(degrees)))
         if isinstance(self.speed, float):
             return degrees[:, np.newaxis]
         return np.column_stack([np.repeat(degrees, len(self.speed)), np.tile(self.speed, len(degrees))])
@@ -70,5 +70,5 @@ class HeadingPlatform:
         poses[...] = pose
         poses[:, :, 0] += times * (speeds * np.cos(headings))[:, np.newaxis]
         poses[:, :, 1] += times * (speeds * np.sin(headings))[:, np.newaxis]
-        poses[:, :, 2] = headings[:, np.newaxis]
+        poses[:, :, HEADING] = headings[:, np.newaxis]
         return poses

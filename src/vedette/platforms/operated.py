@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from vedette.errors import InputError
-from vedette.kernels.base.types import Bools, Floats
+from vedette.kernels.base.types import BUDGET, Bools, Floats
 from vedette.models.arguments import positive, real, reject
 from vedette.platforms.base import (
     SWITCH,
@@ -17,11 +17,8 @@ from vedette.platforms.base import (
     prices_of,
     scans_of,
 )
-from vedette.platforms.camera import POSE_DIM
 from vedette.platforms.wrapper import PlatformWrapper
 
-# Component of a pose: remaining seconds of scanning; after the components of a camera.
-LEFT = POSE_DIM
 _SLACK = 1e-9  # tolerance for rounding, relative to a time
 
 
@@ -84,7 +81,7 @@ class Operated(PlatformWrapper):
         """Return the courses of the platform, with the remaining seconds of scanning."""
         courses = courses_of("platform", self.platform, pose, self._own(actions), times)
         if self.budget is not None:
-            courses[..., LEFT] = self._left(pose, actions, times)
+            courses[..., BUDGET] = self._left(pose, actions, times)
         return courses
 
     def prices(self, actions: Floats) -> Floats:
@@ -105,17 +102,17 @@ class Operated(PlatformWrapper):
 
     def _lasts(self, pose: Floats) -> float:
         """Return the time in s after which a scanning sensor has no scanning time left."""
-        if len(pose) <= LEFT:
-            wanted = f"{LEFT + 1} components, the last of them the seconds left to scan"
+        if len(pose) <= BUDGET:
+            wanted = f"{BUDGET + 1} components, the last of them the seconds left to scan"
             raise InputError(f"pose: expected {wanted}; got {len(pose)}")
-        return float(pose[LEFT]) / (1.0 - self.refill) if self.refill < 1.0 else math.inf
+        return float(pose[BUDGET]) / (1.0 - self.refill) if self.refill < 1.0 else math.inf
 
     def _left(self, pose: Floats, actions: Floats, times: Floats) -> Floats:
         """Return (num_actions, num_times) the seconds of scanning left `times` seconds after each action began."""
         lasts, on = self._lasts(pose), self._is_on(actions)[:, np.newaxis]
-        scanning = pose[LEFT] - (1.0 - self.refill) * times
+        scanning = pose[BUDGET] - (1.0 - self.refill) * times
         empty = self.refill * (times - lasts)
-        found = np.where(on, np.where(times <= lasts, scanning, empty), pose[LEFT] + self.refill * times)
+        found = np.where(on, np.where(times <= lasts, scanning, empty), pose[BUDGET] + self.refill * times)
         return np.asarray(np.clip(found, 0.0, self.budget))
 
     def _own(self, actions: Floats) -> Floats:

@@ -9,19 +9,17 @@ from typing import Any
 import numpy as np
 
 from vedette.errors import InputError
-from vedette.kernels.base.types import OWN_HEIGHT, Floats
+from vedette.kernels.base.types import VISITS, Floats
 from vedette.models.arguments import float_array, positive
 from vedette.platforms.base import courses_of
 from vedette.platforms.wrapper import PlatformWrapper
 
-# Component of a pose: seconds since the last visit of the first place; those of the other places follow.
-CLOCKS = OWN_HEIGHT + 1
 _PARTS = 16  # straight segments that approximate a course, up to the last requested time
 
 
 @dataclass(frozen=True, slots=True)
 class Patrolling(PlatformWrapper):
-    """A platform whose pose has the seconds since it last visited each place, from component 10 on.
+    """A platform whose pose has the seconds since it last visited each place, from component 11 on.
 
     A course is assumed to be straight between the requested times and sixteen more.
 
@@ -45,8 +43,8 @@ class Patrolling(PlatformWrapper):
 
     def courses(self, pose: Floats, actions: Floats, times: Floats) -> Floats:
         """Return the courses of the platform, with the seconds since each place was visited."""
-        if len(pose) < CLOCKS + len(self.places):
-            wanted = f"{CLOCKS + len(self.places)} components, the last of them the seconds since it was at each place"
+        if len(pose) < VISITS + len(self.places):
+            wanted = f"{VISITS + len(self.places)} components, the last of them the seconds since it was at each place"
             raise InputError(f"pose: expected {wanted}; got {len(pose)}")
         nodes = np.union1d(times, np.linspace(0.0, times.max(), _PARTS + 1)[1:])
         courses = courses_of("platform", self.platform, pose, actions, nodes)
@@ -54,7 +52,7 @@ class Patrolling(PlatformWrapper):
         ways, at = np.concatenate([start, courses[..., :2]], axis=1), np.concatenate([[0.0], nodes])
         for k, place in enumerate(self.places):
             last = np.maximum.accumulate(_last_inside(ways, at, np.array(place), self.radius), axis=1)
-            courses[..., CLOCKS + k] = np.where(last >= 0.0, nodes - last, pose[CLOCKS + k] + nodes)
+            courses[..., VISITS + k] = np.where(last >= 0.0, nodes - last, pose[VISITS + k] + nodes)
         return courses[:, np.searchsorted(nodes, times)]
 
 

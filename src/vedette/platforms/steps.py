@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from vedette.kernels.base.types import Floats
+from vedette.kernels.base.types import HEADING, Floats
 from vedette.models.arguments import float_array, non_negative, reject
 from vedette.models.fields import Positive, check_fields
 
@@ -81,7 +81,7 @@ class GridPlatform:
         poses[...] = pose
         poses[:, :, :2] += shares[:, :, np.newaxis] * actions[:, np.newaxis]
         headings = np.arctan2(actions[:, 1], actions[:, 0])
-        poses[:, :, 2] = np.where(moves, headings, pose[2])[:, np.newaxis]
+        poses[:, :, HEADING] = np.where(moves, headings, pose[HEADING])[:, np.newaxis]
         return poses
 
 
@@ -136,5 +136,5 @@ class Waypoints:
         if len(long):
             leg = long[np.minimum(np.searchsorted(ends[long + 1], gone, side="right"), len(long) - 1)]
             away = corners[leg + 1] - corners[leg]
-            poses[:, 2] = np.arctan2(away[:, 1], away[:, 0])
+            poses[:, HEADING] = np.arctan2(away[:, 1], away[:, 0])
         return poses

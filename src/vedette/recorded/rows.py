@@ -13,7 +13,7 @@ from vedette.errors import InputError
 from vedette.internal.covariances import SMALLEST_VARIANCE
 from vedette.internal.quantities import ANGLES, COMPONENTS, HEIGHT_DEPENDENT, QUANTITIES, is_doppler, is_position
 from vedette.internal.text import pluralise, shown
-from vedette.kernels.base.types import OWN_HEIGHT, OWN_VELOCITY, Floats
+from vedette.kernels.base.types import HEADING, OWN_HEIGHT, OWN_VELOCITY, Floats
 from vedette.models.pose_noise import PoseStds, pose_noise
 from vedette.recorded.columns import ScanColumns
 from vedette.recorded.conventions import GAPS, MOST, ONE_PLACE, ONE_PLACE_SHARE, OVER_A_TURN, OWN_SPEEDS, UNITS
@@ -217,8 +217,8 @@ class Rows(ScanColumns):
         elif {"own_x", "own_y"} <= set(self._columns) and not at_site:
             place = self._value(i, "own_x"), self._value(i, "own_y")
         has_heading = "own_heading" in self._columns and not at_site
-        heading = self._angle(i, "own_heading", s, place) if has_heading else site.pose[2]
-        pose = [*place, heading, *site.pose[3:]]
+        heading = self._angle(i, "own_heading", s, place) if has_heading else site.pose[HEADING]
+        pose = [*place, heading, *site.pose[HEADING + 1 :]]
         if is_doppler(site.kind) and self._has(i, OWN_SPEEDS, at_site):
             pose[OWN_VELOCITY : OWN_VELOCITY + 2] = (self._value(i, quantity) for quantity in OWN_SPEEDS)
         if site.kind in HEIGHT_DEPENDENT and self._has(i, ("own_height",), at_site):

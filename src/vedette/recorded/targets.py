@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from vedette.errors import InputError
-from vedette.kernels.base.types import HEIGHT
+from vedette.kernels.base.types import CLIMB, HEIGHT, PLANE, STATE_COMPONENTS, VELOCITY, place_of
 from vedette.models.arguments import real, reject
 from vedette.recorded.cleaning import Cleaning, CleaningCounts, RecordedTrack
 from vedette.recorded.files import read_table
@@ -121,18 +121,19 @@ class RecordedTargets:
         scans = scan_times(times)
         recorded = real("time_origin", self.time_origin) + (scans - scans[0])
         alive = np.zeros((len(self.tracks), len(scans)), np.bool_)
-        states = np.zeros((len(self.tracks), len(scans), HEIGHT + 2 if self.with_height else 4))
+        components = STATE_COMPONENTS["constant_velocity_height"] if self.with_height else PLANE
+        states = np.zeros((len(self.tracks), len(scans), len(components)))
         for i, track in enumerate(self.tracks):
             alive[i] = (recorded >= track.times[0] - TIME_TOLERANCE) & (recorded <= track.times[-1] + TIME_TOLERANCE)
             path = CubicHermiteSpline(track.times, track.positions, track.velocities)
             states[i, alive[i], :2] = path(recorded[alive[i]])
-            states[i, alive[i], 2:4] = path(recorded[alive[i]], 1)
+            states[i, alive[i], VELOCITY] = path(recorded[alive[i]], 1)
             if self.with_height and track.altitudes is not None:
                 at = recorded[alive[i]]
-                states[i, alive[i], HEIGHT] = np.interp(at, track.times, track.altitudes)
+                states[i, alive[i], place_of(HEIGHT, components)] = np.interp(at, track.times, track.altitudes)
                 climbs = np.diff(track.altitudes) / np.diff(track.times)
                 leg = np.clip(np.searchsorted(track.times, at, side="right") - 1, 0, len(climbs) - 1)
-                states[i, alive[i], HEIGHT + 1] = climbs[leg]
+                states[i, alive[i], place_of(CLIMB, components)] = climbs[leg]
         if not alive.any():
             first, last = min(track.times[0] for track in self.tracks), max(track.times[-1] for track in self.tracks)
             expected = f"scans between the first and last report, {_span(first, last)}"

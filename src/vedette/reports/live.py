@@ -16,7 +16,7 @@ from vedette.control import Plan, Planner
 from vedette.evaluation.diagnostics import diagnostics_line, new_target_diagnostics, run_diagnostics
 from vedette.evaluation.figures.scene import build_scene
 from vedette.evaluation.scans import UNKNOWN
-from vedette.kernels.base.types import Floats
+from vedette.kernels.base.types import HEIGHT, Floats, place_of
 from vedette.live import Answer, LiveLoop, LiveState
 from vedette.reports.html import render
 from vedette.reports.replay import (
@@ -83,6 +83,7 @@ class LiveScreen:
         self._decided: tuple[Plan | None, dict[str, Any] | None] = (None, None)
         model = scenario.model
         self._names, self._sections = model.sensor_names, model.sensors
+        self._height = place_of(HEIGHT, model.motion.components)
         strategy = "" if live.planner is None else live.planner.name
         scene = build_scene(scenario, strategy)
         run: dict[str, Any] = {
@@ -97,7 +98,7 @@ class LiveScreen:
             "known": False,
             "origin": None if model.origin is None else [model.origin.lon, model.origin.lat],
             **({"compass": True} if model.by_compass else {}),
-            **({"heights": {"estimates": [], "truth": []}} if model.has_heights else {}),
+            **({"heights": {"estimates": [], "truth": []}} if HEIGHT in model.motion.components else {}),
             "utc": None,
             "names": [],
             "ospa_unit": "",
@@ -132,7 +133,7 @@ class LiveScreen:
             "estimates": []
             if estimates is None
             else [[*estimate_data(estimates, i, decimals), 0, 0.0] for i in range(len(estimates.labels))],
-            "heights": height_data(estimates) if estimates is not None and self._scenario.model.has_heights else [],
+            "heights": [] if estimates is None or self._height < 0 else height_data(estimates, self._height),
             "poses": [pose_data(*each, decimals) for each in zip(poses, self._sections, strict=True)],
             "scans": self._scans(timeline, decimals),
             "decision": self._decision_data(poses),

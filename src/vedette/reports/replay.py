@@ -17,7 +17,7 @@ from vedette.evaluation.ensembles import rounded_choice
 from vedette.evaluation.figures.rewards import best_over_others, best_over_pair, first_pair
 from vedette.evaluation.recording_metadata import recording_metadata
 from vedette.evaluation.scans import PLANE_SHAPES, measurement_code, plane_coordinates, scans_of_record
-from vedette.kernels.base.types import HEIGHT, Floats
+from vedette.kernels.base.types import HEADING, HEIGHT, VELOCITY, VY, Floats, place_of
 from vedette.reports.decision_explanations import explanation_data
 from vedette.reports.groups import Strategy
 from vedette.scenarios import Scenario
@@ -45,7 +45,7 @@ def replay_data(strategy: Strategy, record: RunRecord, group: str, *, trust: boo
     decimals = decimals_for(extent)
     scene, names, sections = strategy.scene, scenario.model.sensor_names, scenario.model.sensors
     sensors = [sensor_data(name, section) for name, section in zip(names, sections, strict=True)]
-    has_velocity = scenario.model.motion.kind != "custom"
+    components = scenario.model.motion.components
     is_known, origin = scenario.model.targets.kind != "unknown", scenario.model.origin
     metadata = recording_metadata(record, scenario)
     errors = record.ospa[strategy.counted[: record.num_scans], 0]
@@ -63,9 +63,9 @@ def replay_data(strategy: Strategy, record: RunRecord, group: str, *, trust: boo
         "zones": [[zone.kind, [rounded_list(corner, decimals) for corner in zone.corners]] for zone in scene.zones],
         "sensors": sensors,
         "times": rounded_list(record.times, 6),
-        "truth": [_targets(record, scan, decimals, has_velocity) for scan in range(record.num_scans)],
+        "truth": [_targets(record, scan, decimals, len(components) > VY) for scan in range(record.num_scans)],
         "estimates": _estimates(record, scenario, decimals),
-        **({"heights": _heights(record)} if scenario.model.has_heights else {}),
+        **({"heights": _heights(record, components)} if HEIGHT in components else {}),
         **({"classes": _classes(record, scenario)} if scenario.model.classes else {}),
         "poses": [
             [pose_data(pose, section, decimals) for pose, section in zip(poses, sections, strict=True)]
@@ -130,7 +130,7 @@ def sensor_data(name: str, section: SensorSection) -> dict[str, Any]:
 
 def pose_data(pose: Floats, section: SensorSection, decimals: int) -> list[float]:
     """Return position and heading, for a camera also its field of view: middle and half width in rad, reach in m."""
-    pose_numbers = [*rounded_list(pose[:2], decimals), round(float(pose[2]), 4)]
+    pose_numbers = [*rounded_list(pose[:2], decimals), round(float(pose[HEADING]), 4)]
     if section.detection.kind == "camera":
         field = field_of_view(section, pose.tolist())
         pose_numbers += [] if field is None else [*rounded_list(field[:2], 4), round(field.reach, decimals)]
@@ -138,10 +138,10 @@ def pose_data(pose: Floats, section: SensorSection, decimals: int) -> list[float
 
 
 def _targets(record: RunRecord, scan: int, decimals: int, has_velocity: bool) -> list[list[float]]:
-    """Return number (from 1) and position of each target, and its velocity unless the motion model is custom."""
+    """Return number (from 1) and position of each target, and its velocity if states have one."""
     ids, states = record.truth.at(scan)
     return [
-        [target + 1, *rounded_list(state[:2], decimals), *(rounded_list(state[2:4], 2) if has_velocity else [])]
+        [target + 1, *rounded_list(state[:2], decimals), *(rounded_list(state[VELOCITY], 2) if has_velocity else [])]
         for target, state in zip(ids.tolist(), states, strict=True)
     ]
 
@@ -175,16 +175,17 @@ def _estimates(record: RunRecord, scenario: Scenario, decimals: int) -> list[lis
     return estimates
 
 
-def _heights(record: RunRecord) -> dict[str, Any]:
+def _heights(record: RunRecord, components: Sequence[str]) -> dict[str, Any]:
     """Return for each scan the heights of the estimates with their standard deviations, and those of the targets, m.
 
-    Targets without heights have none.
+    True targets without heights, such as those of a recording, have none.
     """
     heights: dict[str, Any] = {"estimates": [], "truth": []}
+    place = place_of(HEIGHT, components)
     for scan, estimate in enumerate(record.estimates):
-        heights["estimates"].append(height_data(estimate))
+        heights["estimates"].append(height_data(estimate, place))
         _, states = record.truth.at(scan)
-        heights["truth"].append(rounded_list(states[:, HEIGHT], 0) if states.shape[1] > HEIGHT else [])
+        heights["truth"].append(rounded_list(states[:, place], 0) if states.shape[1] == len(components) else [])
     return heights
 
 
@@ -197,10 +198,10 @@ def _classes(record: RunRecord, scenario: Scenario) -> list[list[list[Any]]]:
     ]
 
 
-def height_data(estimate: Estimate) -> list[list[float]]:
-    """Return the height of each target of an estimate with its standard deviation, m."""
-    stds = np.sqrt(estimate.covs[:, HEIGHT, HEIGHT])
-    return [rounded_list(pair, 0) for pair in zip(estimate.means[:, HEIGHT], stds, strict=True)]
+def height_data(estimate: Estimate, place: int) -> list[list[float]]:
+    """Return the height of each target of an estimate with its standard deviation, m. place: of heights in states."""
+    stds = np.sqrt(estimate.covs[:, place, place])
+    return [rounded_list(pair, 0) for pair in zip(estimate.means[:, place], stds, strict=True)]
 
 
 def estimate_data(estimate: Estimate, index: int, decimals: int) -> list[Any]:

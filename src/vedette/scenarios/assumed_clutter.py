@@ -158,7 +158,7 @@ def _rate(model: ScenarioModel, recording: RecordedScans, s: int, folder: FilePa
 def _placed_scans(model: ScenarioModel, recording: RecordedScans, s: int, folder: FilePath) -> list[PlacedScan]:
     """Return the scans of a sensor as places; none if it measures no places or its noise is unknown."""
     section = model.sensors[s]
-    sensor = section.build(model.region.build(), model.filter.gaussian_method, folder)
+    sensor = section.build(model.region.build(), model.filter.gaussian_method, folder, model.motion.components)
     kind, stds, placed = section.measurement.kind, sensor.noise.least_stds, list[PlacedScan]()
     if kind not in PLACED or stds is None:
         return placed
@@ -166,7 +166,7 @@ def _placed_scans(model: ScenarioModel, recording: RecordedScans, s: int, folder
         if (scan := scans[s]) is None:
             continue
         places = places_of(scan, poses[s], kind)
-        states = np.zeros((len(places), model.motion.state_dim))
+        states = np.zeros((len(places), len(model.motion.components)))
         states[:, :2] = places
         detection = sensor.detection.prob(states, poses[s]) if len(places) else np.empty(0)
         placed.append(PlacedScan(time, places, place_stds(kind, stds, values_of(scan)), detection))

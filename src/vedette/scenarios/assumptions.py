@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from vedette.errors import InputError
-from vedette.kernels.base.types import BEAM, Floats
+from vedette.kernels.base.types import TURN_RATE, Floats
 from vedette.models.heights import ASSUMED_HEIGHT
 from vedette.models.turns import is_turn
 from vedette.recorded import RecordedScans
@@ -67,7 +67,7 @@ def _turns(model: ScenarioModel, recording: RecordedScans) -> str:
     texts = []
     for s, (name, sensor) in enumerate(zip(model.sensor_names, model.sensors, strict=True)):
         sensor_poses = [poses[s] for k, poses in enumerate(recording.poses) if recording.scans[k][s] is not None]
-        rates = [pose[BEAM + 1] for pose in sensor_poses if is_turn(pose)]
+        rates = [pose[TURN_RATE] for pose in sensor_poses if is_turn(pose)]
         if sensor.turn is None and rates:
             rate = float(np.median(rates))
             direction = "clockwise" if rate < 0.0 else "counter-clockwise"
@@ -105,7 +105,7 @@ def assumed_birth(
 ) -> dict[str, Any]:
     """Return births from measurements. measured: the scans of each sensor; learnt: True to learn their rate."""
     std = _BIRTH_STDS * _place_std(model, measured, folder)
-    section = measured_birth(std, speed, model.motion.state_dim, model.has_heights)
+    section = measured_birth(std, speed, model.motion.components)
     rate = f"{EXPECTED_BIRTHS:g} new targets per scan"
     if learnt:
         section["from_measurements"]["expected"] = "learnt"
@@ -119,7 +119,7 @@ def _place_std(model: ScenarioModel, measured: Sequence[Sequence[Floats]], folde
     region, method = model.region.build(), model.filter.gaussian_method
     stds_of_sensors = list[Floats]()
     for section, scans in zip(model.sensors, measured, strict=True):
-        stds = section.build(region, method, folder).noise.least_stds
+        stds = section.build(region, method, folder, model.motion.components).noise.least_stds
         if stds is None or not scans:
             continue
         kind, scan = section.measurement.kind, np.concatenate(scans)

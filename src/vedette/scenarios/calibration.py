@@ -106,9 +106,8 @@ def build_problem(
                 area = wide_region if sensor.clutter.kind == "region" else region
                 added_rates[s] = changes.get("rate", 0.0) - sensor.clutter.rate if changes else 0.0
                 sensor = sensor.model_copy(update={"clutter": sensor.clutter.model_copy(update=changes)})
-                built = sensor.build(
-                    area, _smooth(method, sensor.measurement.kind), folder, filters[s].sensor.detection_at
-                )
+                given = area, _smooth(method, sensor.measurement.kind), folder, targets.motion.components
+                built = sensor.build(*given, filters[s].sensor.detection_at)
                 if sensor.clutter.kind in _SUPPORTED_CLUTTER:
                     raw = at_raw_measurements(built.clutter, *sensor_bias(biased[s], recording.bearings[s]))
                     built = replace(built, clutter=raw)

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from vedette.internal.text import pluralise
-from vedette.kernels.base.types import Floats
+from vedette.kernels.base.types import VELOCITY, Floats
 from vedette.scenarios.diagnostics import Path
 from vedette.scenarios.loading import Scenario
 from vedette.scenarios.recorded_data import recorded_scans
@@ -108,7 +108,7 @@ def new_targets(scenario: Scenario, num_scans: int | None = None) -> NewTargets 
     for source in (each for each in _sources(model, nodes, num) if each.steps.any()):
         views, options = _views(placed, source.mean), []
         death = (1.0 - plain(survival.function)(source.mean, scan, survival.params)) / scan
-        speed = 0.0 if is_moving else math.hypot(*source.mean[2:4], *np.sqrt(np.diag(source.cov)[2:4]))
+        speed = 0.0 if is_moving else math.hypot(*source.mean[VELOCITY], *np.sqrt(np.diag(source.cov)[VELOCITY]))
         lasts = min(1.0 / death if death else math.inf, width / speed if speed else math.inf)
         for group in filter(None, [views] if has_one_belief else [[view] for view in views]):
             rate = sum(view.rate for view in group)
@@ -143,7 +143,8 @@ def _placed(model: ScenarioModel, folder: FilePath) -> list[_Placed]:
         poses = list(recording.poses[len(recording.times) // 2])
         numbers = np.array([[each is not None for each in scans] for scans in recording.scans]).sum(axis=0)
         periods = (len(recording.times) * scan / np.maximum(numbers, 1)).tolist()
-    return list(zip((each.build(region, method, folder) for each in model.sensors), poses, periods, strict=True))
+    given = region, method, folder, model.motion.components
+    return list(zip((each.build(*given) for each in model.sensors), poses, periods, strict=True))
 
 
 def _views(placed: Sequence[_Placed], state: Floats) -> list[_View]:

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 from vedette.errors import InputError
 from vedette.internal.quantities import HEIGHT_DEPENDENT
+from vedette.kernels.base.types import STATE_COMPONENTS
 from vedette.scenarios.diagnostics import Finding, describe
 from vedette.scenarios.sections import ScenarioModel
 from vedette.scenarios.sections.base import is_complete, readable_findings
@@ -32,13 +33,14 @@ def recorded_targets(world: ScenarioModel, folder: Path) -> RecordedSource:
     section = world.targets
     assert isinstance(section, RecordedTargets)
     origin = None if world.origin is None else (world.origin.lon, world.origin.lat)
-    found = section.source(world.region, origin, world.motion.kind == "constant_velocity_height", folder)
+    has_height = world.motion.components == STATE_COMPONENTS["constant_velocity_height"]
+    found = section.source(world.region, origin, has_height, folder)
     if found.with_height:
         return found
     measured = world.recording is None and any(each.measurement.kind in HEIGHT_DEPENDENT for each in world.sensors)
     if measured or world.ospa.components == "position_and_height":
-        wanted = "a column altitude_m of every report, as true heights are measured or compared"
-        raise InputError(f"{section.path}: expected {wanted}; got none")
+        wanted = "a column altitude_m of every report, and a motion with only pz and vz behind the velocity"
+        raise InputError(f"{section.path}: expected {wanted}, as true heights are measured or compared; got none")
     return found
 
 

@@ -8,6 +8,7 @@ import numpy as np
 
 from vedette.internal.quantities import COMPONENTS, PLACED
 from vedette.internal.text import pluralise
+from vedette.kernels.base.types import VELOCITY, VY
 from vedette.recorded import RecordedScans
 from vedette.recorded import RecordedTargets as RecordedSource
 from vedette.recorded.cleaning import longest_reachable
@@ -74,9 +75,9 @@ def _single_reports(section: RecordedTargets, source: RecordedSource) -> Iterato
 def _large_scan_window(model: ScenarioModel, recording: RecordedScans) -> Iterator[tuple[Path, str]]:
     """Yield warnings of rows gathered into one scan although targets move by more than the noise between them."""
     births = model.birth.from_measurements
-    if births is None or len(births.std) < 4:
+    if births is None or len(births.std) <= VY:
         return
-    speed = max(births.std[2:4])
+    speed = max(births.std[VELOCITY])
     for s, (sensor, window) in enumerate(zip(model.sensors, recording.gathered, strict=False)):
         stds = noise_stds(sensor)
         if stds is None or sensor.measurement.kind not in PLACED or speed * window <= stds[1]:

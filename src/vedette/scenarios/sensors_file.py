@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path as FilePath
 from typing import Any, NamedTuple
@@ -11,6 +11,7 @@ from vedette.errors import InputError, ScenarioError
 from vedette.internal.quantities import COMPONENTS, HEIGHT_DEPENDENT
 from vedette.internal.reading import read_text
 from vedette.internal.text import pluralise
+from vedette.kernels.base.types import CLIMB, HEIGHT, PLANE, STATE_COMPONENTS, VELOCITY
 from vedette.scenarios.diagnostics import Diagnostic, Fault, describe
 from vedette.scenarios.loading import diagnose, locate_fault
 from vedette.scenarios.sections import ScenarioModel
@@ -18,7 +19,6 @@ from vedette.scenarios.sections.base import Section
 from vedette.scenarios.sections.courses import headings_beside_north
 from vedette.scenarios.sections.recording import RecordingSection
 from vedette.scenarios.sections.targets import RecordedTargets
-from vedette.scenarios.sections.world import STATE_DIMS
 from vedette.scenarios.validation import read_section
 from vedette.scenarios.wording import name_in_words
 from vedette.scenarios.yaml_reader import MAX_BYTES, Document, read_yaml
@@ -105,8 +105,8 @@ def placeholder_sections(given: Mapping[str, Any], speed: float) -> dict[str, An
     section = given.get("motion")
     motion: Mapping[str, Any] = section if isinstance(section, Mapping) else {}
     kind = motion.get("kind", "constant_velocity_height" if has_height else "constant_velocity")
-    dim = motion.get("state_dim", STATE_DIMS.get(kind) if isinstance(kind, str) else None)
-    birth = measured_birth(100.0, speed, dim if isinstance(dim, int) else 4, has_height)
+    names = motion.get("components", STATE_COMPONENTS.get(kind) if isinstance(kind, str) else None)
+    birth = measured_birth(100.0, speed, names if isinstance(names, Sequence) else PLANE)
     return {**_PLACEHOLDERS, "birth": birth, **({"motion": {"kind": "constant_velocity_height"}} if has_height else {})}
 
 
@@ -118,17 +118,17 @@ def measures_heights(given: Mapping[str, Any]) -> bool:
     return any(isinstance(each, Mapping) and each.get("kind") in HEIGHT_DEPENDENT for each in measured)
 
 
-def measured_birth(std: float, speed: float, state_dim: int, has_height: bool = False) -> dict[str, Any]:
+def measured_birth(std: float, speed: float, components: Sequence[str]) -> dict[str, Any]:
     """Return a section `birth` with births from measurements.
 
     Args:
         std: of positions, m.
         speed: standard deviation of velocities, m/s.
-        state_dim: of states.
-        has_height: True if height and vertical velocity follow in them; else a turn rate may.
+        components: names of the components of states.
     """
-    height_stds = [HEIGHT_STD, _CLIMB_STD] if has_height and state_dim > 5 else []
-    stds = [std, std, speed, speed, *height_stds, *[0.1] * (state_dim - 4 - len(height_stds))]
+    known = {**dict.fromkeys(PLANE[:2], std), **dict.fromkeys(PLANE[VELOCITY], speed)}
+    known |= {HEIGHT: HEIGHT_STD, CLIMB: _CLIMB_STD}
+    stds = [known.get(name, 0.1) for name in components]
     return {"sites": [], "from_measurements": {"expected": EXPECTED_BIRTHS, "max_existence": _EXISTENCE, "std": stds}}
 
 

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 
 from vedette.errors import ModelError
 from vedette.internal.representation import SummaryRepr
-from vedette.kernels.base.types import Bools, Floats, Ints
+from vedette.kernels.base.types import VELOCITY, VY, Bools, Floats, Ints
 from vedette.kernels.gaussian.scans import add_noise, mixed_scan, seen_with
 from vedette.models import SensorModel
 from vedette.models.arguments import float_array, generator, pose_vector, reject
@@ -146,9 +146,9 @@ def active_scans(scans: Sequence[Scan | None], off: Bools) -> tuple[Scan | None,
 def _shown(sensor: TrueSensor, states: Floats, pose: Floats) -> tuple[Floats, Floats]:
     """Return the targets' states at the true time of the scan, and the true pose of the sensor."""
     bias = sensor.bias
-    if bias.clock and states.shape[1] >= 4:
+    if bias.clock and states.shape[1] > VY:
         states = states.copy()
-        states[:, :2] -= bias.clock * states[:, 2:4]
+        states[:, :2] -= bias.clock * states[:, VELOCITY]
     if "x" not in sensor.model.measurement.components and (bias.x or bias.y):
         pose = pose.copy()
         pose[:2] -= bias.x, bias.y

@@ -22,7 +22,7 @@ from stonesoup.models.transition.linear import (
 )
 from stonesoup.models.transition.nonlinear import ConstantTurn
 
-from vedette.kernels.base.types import Floats
+from vedette.kernels.base.types import PLANE, Floats
 from vedette.models import MotionModel, constant_velocity, coordinated_turn, model_function
 from vedette.models.arguments import float_array, non_negative, reject
 
@@ -138,7 +138,8 @@ def _of_axes(model: Any) -> tuple[MotionModel, StateLayout]:
     layout = StateLayout(tuple(axis * num + i for i in range(num) for axis in range(2)))
     if num == 2 and noise[0] == noise[1]:
         return constant_velocity(math.sqrt(noise[0]), noise_model="continuous_white"), layout
-    return MotionModel(2 * num, _taylor, _integrated_noise, np.empty(0), noise, _taylor_jacobian), layout
+    functions = _taylor, _integrated_noise, np.empty(0), noise, _taylor_jacobian
+    return MotionModel(2 * num, *functions, components=(*PLANE, "ax", "ay") if num == 3 else ()), layout
 
 
 def _of_turn(model: Any) -> tuple[MotionModel, StateLayout]:

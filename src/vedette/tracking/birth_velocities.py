@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from vedette.densities import LMB
-from vedette.kernels.base.types import Floats
+from vedette.kernels.base.types import VELOCITY, VX, VY, Floats
 from vedette.kernels.gaussian.innovation import FOLDED_STDS
 from vedette.kernels.gaussian.scratch import FULL_TURN
 from vedette.models import SensorModel
@@ -37,7 +37,7 @@ def with_velocities(births: LMB, std: Floats, sensors: Sequence[SensorModel], sc
         for sensor, scan, pose in zip(sensors, scans, poses, strict=True)
         if sensor.meas_dim > 2 and sensor.measurement.jacobian is not None and scan is not None and len(scan)
     ]
-    if not informative or len(std) < 4 or not births.tracks.num_tracks:
+    if not informative or len(std) <= VY or not births.tracks.num_tracks:
         return births
     lmb = births.to_kernel()
     components = lmb.tracks.components
@@ -62,14 +62,14 @@ def at_scan_time(births: LMB, poses: Sequence[Floats]) -> LMB:
     lmb = births.to_kernel()
     components = lmb.tracks.components
     num, dim = components.means.shape
-    if dim < 4:
+    if dim <= VY:
         return births
     offsets = [components.means[:, :2] - pose[:2] for pose in turning]
     lag = sum(
         lags(np.arctan2(offset[:, 1], offset[:, 0]), pose) for offset, pose in zip(offsets, turning, strict=True)
     ) / len(poses)
     transforms = np.tile(np.eye(dim), (num, 1, 1))
-    transforms[:, 0, 2] = transforms[:, 1, 3] = -lag
+    transforms[:, 0, VX] = transforms[:, 1, VY] = -lag
     means = (transforms @ components.means[:, :, np.newaxis])[..., 0]
     moved = components._replace(means=means, covs=transforms @ components.covs @ transforms.swapaxes(1, 2))
     return LMB.from_kernel(lmb._replace(tracks=lmb.tracks._replace(components=moved)))
@@ -83,7 +83,7 @@ def _condition(means: Floats, covs: Floats, std: Floats, sensor: SensorModel, sc
     slopes = np.empty((len(scan), sensor.meas_dim, len(std)))
     assert model.jacobian is not None
     write_rows(model.jacobian, states_at_rest, pose, model.params, slopes)
-    rows = np.flatnonzero(slopes[:, :, 2:4].any(axis=(0, 2)))
+    rows = np.flatnonzero(slopes[:, :, VELOCITY].any(axis=(0, 2)))
     gaps = np.abs(means[:, np.newaxis, :2] - states_at_rest[:, :2]) / std[:2]
     all_births, nearest = np.arange(len(means)), gaps.max(axis=2).argmin(axis=1)
     births = np.flatnonzero(gaps.max(axis=2)[all_births, nearest] <= 1.0)
@@ -91,16 +91,16 @@ def _condition(means: Floats, covs: Floats, std: Floats, sensor: SensorModel, sc
         return
     matched = nearest[births]
     covs_of_noise = noise_of_rows(scan, sensor.noise.covs(states_at_rest, pose, sensor.meas_dim))
-    slope, noise = slopes[matched][:, rows, 2:4], covs_of_noise[matched][:, rows][:, :, rows]
+    slope, noise = slopes[matched][:, rows, VELOCITY], covs_of_noise[matched][:, rows][:, :, rows]
     off = measured - model.measure(states_at_rest, pose)
-    prior, periods = covs[births, 2:4, 2:4], model.periods[rows]
-    residual = wrap_periodic(off[matched][:, rows] - (slope @ means[births, 2:4, np.newaxis])[..., 0], periods)
+    prior, periods = covs[births, VELOCITY, VELOCITY], model.periods[rows]
+    residual = wrap_periodic(off[matched][:, rows] - (slope @ means[births, VELOCITY, np.newaxis])[..., 0], periods)
     spread = slope @ prior @ slope.swapaxes(1, 2)
     # A folded component that may be one of several periods has no effect.
     reach = np.where(periods == FULL_TURN, 0.0, FOLDED_STDS * np.sqrt(np.diagonal(spread, axis1=1, axis2=2)))
     slope = np.where((reach > 0.5 * periods)[..., np.newaxis], 0.0, slope)
     innovation = slope @ prior @ slope.swapaxes(1, 2) + noise
     gain = np.linalg.solve(innovation, slope @ prior).swapaxes(1, 2)
-    means[births, 2:4] += (gain @ residual[..., np.newaxis])[..., 0]
+    means[births, VELOCITY] += (gain @ residual[..., np.newaxis])[..., 0]
     posterior = prior - gain @ innovation @ gain.swapaxes(1, 2)
-    covs[births, 2:4, 2:4] = 0.5 * (posterior + posterior.swapaxes(1, 2))
+    covs[births, VELOCITY, VELOCITY] = 0.5 * (posterior + posterior.swapaxes(1, 2))

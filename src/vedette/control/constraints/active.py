@@ -9,10 +9,9 @@ from typing import ClassVar, NamedTuple
 import numpy as np
 
 from vedette.control.constraints.protocol import ActivationConstraint, Constraint, ConstraintContext
-from vedette.kernels.base.types import Bools, Floats, Ints
+from vedette.kernels.base.types import BUDGET, Bools, Floats, Ints
 from vedette.models.arguments import provides
 from vedette.models.fields import Checked, Count, part
-from vedette.platforms.operated import LEFT
 
 
 @part("max_active", "constraint")
@@ -109,7 +108,7 @@ def active_of(constraints: Sequence[Constraint], courses: Sequence[Floats], scan
 def _twins(courses: Floats, on: Bools) -> Ints:
     """Return (num_courses,) indices as in `Active.off`."""
     twins, silent = np.arange(len(courses)), np.flatnonzero(~on)
-    poses = np.delete(courses, LEFT, axis=2) if courses.shape[2] > LEFT else courses
+    poses = np.delete(courses, BUDGET, axis=2) if courses.shape[2] > BUDGET else courses
     of_pose = {poses[course].tobytes(): course for course in silent[::-1].tolist()}
     for course in np.flatnonzero(on).tolist():
         twins[course] = of_pose.get(poses[course].tobytes(), course)

@@ -12,12 +12,11 @@ import numpy as np
 from vedette.control.constraints.protocol import ConstraintContext, PerSensorConstraint, least_on_legs
 from vedette.densities import as_lmb, track_moments
 from vedette.errors import InputError
-from vedette.kernels.base.types import Floats, Ints
+from vedette.kernels.base.types import POINTING, VISITS, Floats, Ints
 from vedette.models.arguments import float_array
 from vedette.models.fields import Positive, Probability, check_fields
 from vedette.models.measurement import wrap_angles
-from vedette.platforms.camera import POINTING, angle_beyond_view, is_camera, view_gap
-from vedette.platforms.patrolling import CLOCKS
+from vedette.platforms.camera import angle_beyond_view, is_camera, view_gap
 
 # Horizons of lead before a place is due: one in which a platform may still move away, and one for the way.
 _HORIZONS = 2.0
@@ -72,12 +71,12 @@ class Revisit(PerSensorConstraint):
 
     def _to_places(self, situation: ConstraintContext, poses: Floats) -> Iterator[tuple[int, Floats]]:
         """Yield the sensors that must go to a place, each with the distances (num_courses,) m of its courses."""
-        places, num = np.array(self.places), CLOCKS + len(self.places)
+        places, num = np.array(self.places), VISITS + len(self.places)
         if poses.shape[1] < num:
             expected = f"poses of {num} components, the last of them seconds since the last visits (see Patrolling)"
             raise InputError(f"constraint {self.name}: expected {expected}; got {poses.shape[1]}")
-        patrols = np.flatnonzero(poses[:, CLOCKS] >= 0.0)
-        since = poses[patrols, CLOCKS:num].min(axis=0, initial=math.inf)
+        patrols = np.flatnonzero(poses[:, VISITS] >= 0.0)
+        since = poses[patrols, VISITS:num].min(axis=0, initial=math.inf)
         for sensor, place in self._sent(situation, patrols, poses[:, :2], places, since):
             x, y = np.moveaxis(situation.ways(sensor) - places[place], 2, 0)
             yield sensor, np.maximum(np.sqrt(least_on_legs(x, y).min(axis=1)) - self.radius, 0.0)

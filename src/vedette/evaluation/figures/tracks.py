@@ -38,7 +38,7 @@ from vedette.evaluation.figures.style import (
     styled,
 )
 from vedette.internal.text import named_in
-from vedette.kernels.base.types import Floats, Ints
+from vedette.kernels.base.types import HALF_WIDTH, Floats, Ints
 from vedette.simulation.records import RunRecord
 
 LARGE = 5000.0  # m; axes of a larger extent are in kilometres
@@ -245,7 +245,7 @@ def _draw_field(axes: Axes, row: dict[str, float], pose: Floats, size: float, sc
     """Draw a sector of a given size in the chosen pointing direction of the sensor."""
     middle = drawn_angle(row, "pointing_deg", "azimuth_deg")
     if middle is not None:
-        half = row.get("half_width_deg", float(np.rad2deg(pose[4])) if len(pose) > 4 else 0.0)
+        half = row.get("half_width_deg", float(np.rad2deg(pose[HALF_WIDTH])) if len(pose) > HALF_WIDTH else 0.0)
         sides = middle - half, middle + half
         axes.add_patch(Wedge(_point(pose[:2] * scale), size * scale, *sides, color=INK, alpha=0.2, lw=0, zorder=5))
 

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -24,13 +23,11 @@ from vedette.evaluation.metrics.assignment import (
     point_sets,
     power_mean,
 )
-from vedette.internal.text import join_alternatives
-from vedette.kernels.base.types import HEIGHT, Floats
+from vedette.kernels.base.types import Floats
 from vedette.models.arguments import reject
 from vedette.simulation.truth import Truth
 
-# Components of states in the distance.
-_COMPONENTS: dict[str, Any] = {"position": slice(2), "position_and_height": [0, 1, HEIGHT], "state": slice(None)}
+_COMPONENTS = {"position": slice(2), "state": slice(None)}
 _DIMENSIONS_DIFFER = "position, as true states have {} components and estimated ones {}"
 
 
@@ -71,7 +68,7 @@ def ospa(estimates: ArrayLike, truths: ArrayLike, *, cutoff: float, order: float
 
 
 def ospa_of_run(
-    truth: Truth, estimates: Sequence[Estimate], *, cutoff: float, order: float, components: str = "position"
+    truth: Truth, estimates: Sequence[Estimate], *, cutoff: float, order: float, components: ArrayLike = "position"
 ) -> Floats:
     """Return the OSPA of the estimates at every scan of a run.
 
@@ -80,23 +77,22 @@ def ospa_of_run(
         estimates: one per scan.
         cutoff: c > 0, m, without a unit for full states.
         order: p >= 1.
-        components: "position", the distance in the plane; "position_and_height", the distance in space, for states
-            [px, py, vx, vy, pz, vz]; or "state": Euclidean distance over all components, ignoring the units m, m/s and
-            rad/s.
+        components: "position", the distance in the plane; "state", the Euclidean distance over all components, ignoring
+            the units m, m/s and rad/s; or places in states, such as [0, 1, 4] for the distance in space.
 
     Returns (num_scans, 3): total, localisation and cardinality parts, m, without a unit for full states.
     Raises `InputError` as `ospa` does, for other components, and unless there is one estimate per scan.
     """
     check_parameters(cutoff, order)
     check_scans(truth, estimates)
-    if components not in _COMPONENTS:
-        raise reject("components", join_alternatives(list(_COMPONENTS)), components)
-    counted = _COMPONENTS[components]
+    if isinstance(components, str) and components not in _COMPONENTS:
+        raise reject("components", "position, state or places in states", components)
+    counted = _COMPONENTS[components] if isinstance(components, str) else np.asarray(components)
     parts = np.empty((len(estimates), 3))
     for scan, estimate in enumerate(estimates):
         _, states = truth.at(scan)
         for points in (estimate.means, states):
-            if isinstance(counted, list) and points.shape[1] <= counted[-1]:
+            if isinstance(counted, np.ndarray) and points.shape[1] <= counted.max():
                 raise reject("components", f"position, as states have {points.shape[1]} components", components)
         estimated, true = estimate.means[:, counted], states[:, counted]
         if len(estimated) and len(true) and estimated.shape[1] != true.shape[1]:

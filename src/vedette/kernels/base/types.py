@@ -5,6 +5,7 @@ Ragged data is flat with offsets (CSR): the entries of item `i` are `offsets[i]:
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -14,10 +15,30 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 Bools = NDArray[np.bool_]
 
-OWN_VELOCITY = 6  # index in a pose of the sensor's velocity (two components), m/s
-BEAM = 8  # index in a pose of the beam's bearing in the middle of a turn, rad; the turn rate follows, rad/s
-OWN_HEIGHT = 10  # index in a pose of the sensor's height, m; 0 in a shorter pose
-HEIGHT = 4  # index in a state [px, py, vx, vy, pz, vz] of the height, m, where a measurement depends on it
+# States begin with the position, those of four components or more also with the velocity. Others are found by name.
+VX, VY = 2, 3
+VELOCITY = slice(VX, VY + 1)  # m/s
+HEIGHT, CLIMB = "pz", "vz"  # names of the height, m, and the vertical velocity, m/s
+PLANE = ("px", "py", "vx", "vy")
+STATE_COMPONENTS = {
+    "constant_velocity": PLANE,
+    "coordinated_turn": (*PLANE, "turn_rate"),
+    "constant_velocity_height": (*PLANE, HEIGHT, CLIMB),
+}
+
+# Components of a pose have fixed places. A shorter pose lacks the last ones.
+HEADING = 2  # rad
+POINTING, HALF_WIDTH = 3, 4  # middle and half width of a camera's field of view, rad
+BUDGET = 5  # remaining seconds of scanning
+OWN_VELOCITY = 6  # velocity of the sensor, two components, m/s
+BEAM, TURN_RATE = 8, 9  # bearing of the beam in the middle of a turn, rad, and turn rate of the beam, rad/s
+OWN_HEIGHT = 10  # height of the sensor, m
+VISITS = 11  # seconds since the last visit of the first place; those of the other places follow
+
+
+def place_of(name: str, components: Sequence[str]) -> int:
+    """Return the place of a component in states, or -1 if they do not have it."""
+    return components.index(name) if name in components else -1
 
 
 class Marks(NamedTuple):
@@ -102,6 +123,7 @@ class Sensor(NamedTuple):
     clutter_params: Floats
     periods: Floats  # (meas_dim,) interval after which a component repeats, such as 2 pi for an angle; inf: it does not
     method: int  # as in `Motion`, or SWITCHED
+    height: int  # place in states of the height that the measurement depends on, or -1
     detection_rule: int  # AT_CENTRE, CLOSED_FORM, BY_NODES or AT_EDGES of `vedette.kernels.gaussian.detection`
     detection_nodes: Floats  # (num, 3) weight and two standard deviates per node; empty for AT_CENTRE
 

@@ -13,10 +13,21 @@ import math
 from typing import NamedTuple
 
 from vedette.kernels.base.compile import borrowing, inlined
-from vedette.kernels.base.types import BEAM, HEIGHT, OWN_HEIGHT, OWN_VELOCITY, Floats
+from vedette.kernels.base.types import BEAM, OWN_HEIGHT, OWN_VELOCITY, TURN_RATE, VX, VY, Floats
 from vedette.kernels.gaussian.scratch import wrap_angle
 
 _NEWTON_STEPS = 3
+
+
+class Rise(NamedTuple):
+    """The height in states that a measurement depends on, by places that are -1 for none."""
+
+    height: int  # place of the height
+    climb: int  # place of the vertical velocity
+    speed: float  # vertical velocity, m/s
+
+
+LEVEL = Rise(-1, -1, 0.0)  # no height
 
 
 class Passage(NamedTuple):
@@ -36,23 +47,23 @@ class Passage(NamedTuple):
 @inlined
 def turns(pose: Floats) -> bool:
     """Return True if the pose belongs to a scan of a turning beam."""
-    return pose.shape[0] > BEAM + 1 and pose[BEAM + 1] != 0.0
+    return pose.shape[0] > TURN_RATE and pose[TURN_RATE] != 0.0
 
 
 @inlined
 def own_lag(bearing: float, pose: Floats) -> float:
     """Return the time at which the beam points in a direction, s after the scan time, within half a turn."""
-    return wrap_angle(bearing - pose[BEAM]) / pose[BEAM + 1]
+    return wrap_angle(bearing - pose[BEAM]) / pose[TURN_RATE]
 
 
 @borrowing
 def _passage(state: Floats, pose: Floats) -> Passage:
     """Solve theta(lag) = bearing + rate * lag by Newton's method, starting from the direction at the scan time."""
     x, y = state[0] - pose[0], state[1] - pose[1]
-    moves = state.shape[0] >= 4
-    vx = (state[2] if moves else 0.0) - pose[OWN_VELOCITY]
-    vy = (state[3] if moves else 0.0) - pose[OWN_VELOCITY + 1]
-    rate, lag = pose[BEAM + 1], own_lag(math.atan2(y, x), pose)
+    moves = state.shape[0] > VY
+    vx = (state[VX] if moves else 0.0) - pose[OWN_VELOCITY]
+    vy = (state[VY] if moves else 0.0) - pose[OWN_VELOCITY + 1]
+    rate, lag = pose[TURN_RATE], own_lag(math.atan2(y, x), pose)
     dx, dy = x + vx * lag, y + vy * lag
     for _ in range(_NEWTON_STEPS):
         square = dx * dx + dy * dy
@@ -96,7 +107,7 @@ def own_place(bearing: float, pose: Floats) -> tuple[float, float]:
 
 
 @inlined
-def to_scan_time(at: Passage, pose: Floats, moves_with_target: bool, climb: float, out: Floats) -> None:
+def to_scan_time(at: Passage, pose: Floats, moves_with_target: bool, rise: Rise, out: Floats) -> None:
     """Convert derivatives (meas_dim, state_dim) by the state at the passage into those by the state at the scan time.
 
     With position p, velocity v and bearing gradient b, the lag changes by
@@ -106,23 +117,23 @@ def to_scan_time(at: Passage, pose: Floats, moves_with_target: bool, climb: floa
     and the offset by dp + lag dv + v d lag.
 
     at: the passage. moves_with_target: True if the measurement is the target's position, False if it depends on the
-    offset from the sensor. climb: vertical velocity where the measurement depends on a height, m/s, else 0.
+    offset from the sensor. rise: the height that it depends on, or `LEVEL`.
     """
     square = at.dx * at.dx + at.dy * at.dy
     if at.lag == 0.0 or square == 0.0:
         return
     bx, by = -at.dy / square, at.dx / square
-    share = pose[BEAM + 1] - (bx * at.vx + by * at.vy)
+    share = pose[TURN_RATE] - (bx * at.vx + by * at.vy)
     vx, vy = at.vx, at.vy
     if moves_with_target:
         vx, vy = vx + pose[OWN_VELOCITY], vy + pose[OWN_VELOCITY + 1]
     for row in range(out.shape[0]):
         along = (out[row, 0] * vx + out[row, 1] * vy) / share
-        if out.shape[1] > HEIGHT + 1:
-            along += out[row, HEIGHT] * climb / share
-            out[row, HEIGHT + 1] += at.lag * out[row, HEIGHT]
+        if rise.climb >= 0:
+            along += out[row, rise.height] * rise.speed / share
+            out[row, rise.climb] += at.lag * out[row, rise.height]
         out[row, 0] += along * bx
         out[row, 1] += along * by
-        if out.shape[1] >= 4:
-            out[row, 2] += at.lag * out[row, 0]
-            out[row, 3] += at.lag * out[row, 1]
+        if out.shape[1] > VY:
+            out[row, VX] += at.lag * out[row, 0]
+            out[row, VY] += at.lag * out[row, 1]

@@ -9,7 +9,7 @@ import numpy as np
 
 from vedette.errors import ModelError
 from vedette.kernels.base.compile import borrowing, inlined, kernel
-from vedette.kernels.base.types import HEIGHT, Bools, Floats, RowNoise, Sensor
+from vedette.kernels.base.types import Bools, Floats, RowNoise, Sensor
 from vedette.kernels.gaussian.beam import own_height
 from vedette.kernels.gaussian.detection import detection_and_edge
 from vedette.kernels.gaussian.joseph import posterior_of_squares
@@ -194,36 +194,29 @@ def condition_linear(
 
 
 @inlined
-def _has_height(jacobian: Floats, n: int, m: int) -> bool:
-    """Return True if the measurement depends on component `HEIGHT` of a state with a vertical velocity behind it."""
-    if n > HEIGHT + 1:
-        for a in range(m):
-            if jacobian[a, HEIGHT] != 0.0:
-                return True
-    return False
-
-
-@inlined
-def bends_over(pose: Floats, mean: Floats, cov: Floats, jacobian: Floats, noise: Floats, n: int, m: int) -> bool:
+def bends_over(
+    pose: Floats, mean: Floats, cov: Floats, jacobian: Floats, noise: Floats, height: int, n: int, m: int
+) -> bool:
     """Return True if the second-order error of a component exceeds `LARGEST_BEND` standard deviations of its noise.
 
     A measurement of a position at distance d has second derivatives of about |H| / d. Over a position of variance V,
     both axes together, component a is then off by |H_a| V / (2 d), which is the sagitta V / (2 d) of a range, and by
-    |H_aj| sqrt(V P_jj) / d with another component j of the state. A height that is measured is part of the position.
+    |H_aj| sqrt(V P_jj) / d with another component j of the state. A height that is measured is part of the position,
+    `height` is its place in the state, or -1.
     """
     dx, dy, variance = mean[0] - pose[0], mean[1] - pose[1], cov[0, 0] + cov[1, 1]
-    square, has_height = dx * dx + dy * dy, _has_height(jacobian, n, m)
-    if has_height:
-        dz = mean[HEIGHT] - own_height(pose)
-        square, variance = square + dz * dz, variance + cov[HEIGHT, HEIGHT]
+    square = dx * dx + dy * dy
+    if height >= 0:
+        dz = mean[height] - own_height(pose)
+        square, variance = square + dz * dz, variance + cov[height, height]
     limit = 4.0 * LARGEST_BEND * LARGEST_BEND * square
     for a in range(m):
         slope = jacobian[a, 0] * jacobian[a, 0] + jacobian[a, 1] * jacobian[a, 1]
-        if has_height:
-            slope += jacobian[a, HEIGHT] * jacobian[a, HEIGHT]
+        if height >= 0:
+            slope += jacobian[a, height] * jacobian[a, height]
         slope *= variance
         for j in range(2, n):
-            if not (has_height and j == HEIGHT):
+            if j != height:
                 slope += 4.0 * jacobian[a, j] * jacobian[a, j] * cov[j, j]
         if variance * slope > limit * noise[a, a]:
             return True
@@ -301,7 +294,7 @@ def expect_measurement(
         sensor.measurement(mean, pose, sensor.measurement_params, out.predicted[at])
         sensor.measurement_jacobian(mean, pose, sensor.measurement_params, jacobian)
         log_uniform = ignore_ambiguous(sensor, jacobian, cov, noise)
-    out.bends[at] = sensor.method == SWITCHED and bends_over(pose, mean, cov, jacobian, noise, n, m)
+    out.bends[at] = sensor.method == SWITCHED and bends_over(pose, mean, cov, jacobian, noise, sensor.height, n, m)
     if out.bends[at] or not linearised:
         weights = _expect_sigma_points(sensor, pose, mean, cov, out.predicted[at], cross, scratch)
         for a in range(2, m):

@@ -233,7 +233,7 @@ def learn_at_mean(sensor: Sensor, pair: Pair, share: float, work: PairWork) -> N
     sensor.measurement_noise_cov(pair.mean, pair.pose, sensor.noise_params, noise)
     sensor.measurement_jacobian(pair.mean, pair.pose, sensor.measurement_params, jacobian)
     ignore_ambiguous(sensor, jacobian, pair.cov, noise)
-    if sensor.method == SWITCHED and bends_over(pair.pose, pair.mean, pair.cov, jacobian, noise, n, m):
+    if sensor.method == SWITCHED and bends_over(pair.pose, pair.mean, pair.cov, jacobian, noise, sensor.height, n, m):
         condition_linear(pair.mean, pair.cov, factor, cross, scratch, posterior)
         for j in range(n):
             state[j] = pair.mean[j]

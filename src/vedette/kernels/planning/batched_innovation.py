@@ -103,7 +103,7 @@ def _condition(num: int, batch: BatchedGaussians, work: BatchWork) -> None:
 
 
 @inlined
-def _mark_bent(form: int, pose: Floats, num: int, batch: BatchedGaussians, work: BatchWork) -> None:
+def _mark_bent(form: int, height: int, pose: Floats, num: int, batch: BatchedGaussians, work: BatchWork) -> None:
     """Set the volumes of Gaussians with too nonlinear measurements to NaN, see `innovation.bends_over`."""
     volume, dim, meas_dim = work.volume, batch.means.shape[0], batch.predicted.shape[0]
     if form == ANY:
@@ -115,7 +115,7 @@ def _mark_bent(form: int, pose: Floats, num: int, batch: BatchedGaussians, work:
             for a in range(meas_dim):
                 for j in range(dim):
                     jacobian[a, j] = work.jacobian[a * dim + j, s]
-            if bends_over(pose, work.mean, work.cov, jacobian, noise, dim, meas_dim):
+            if bends_over(pose, work.mean, work.cov, jacobian, noise, height, dim, meas_dim):
                 volume[s] = math.nan
         return
     squares, first, second = work.offsets.squares, batch.covs[0], batch.covs[place(1, 1)]
@@ -187,7 +187,7 @@ def expect_batch(
     _project(width, num, batch, work)
     _condition(num, batch, work)
     if sensor.method == SWITCHED:
-        _mark_bent(forms.measurement, pose, num, batch, work)
+        _mark_bent(forms.measurement, sensor.height, pose, num, batch, work)
     wrong = _mark_cancelled(num, batch, work)
     for s in range(num):
         batch.log_norm[s] = work.volume[s]

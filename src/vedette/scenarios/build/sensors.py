@@ -12,11 +12,10 @@ import numpy as np
 
 from vedette.control import MobileSensor
 from vedette.filters import Filter, PredictUpdateFilter
-from vedette.kernels.base.types import OWN_VELOCITY, Bools, Floats
+from vedette.kernels.base.types import OWN_VELOCITY, VISITS, Bools, Floats
 from vedette.models import SensorModel, TargetModel
 from vedette.platforms import Actions, ByCompass, Operated, Patrolling, Platform
 from vedette.platforms.base import SWITCH, actions_at
-from vedette.platforms.patrolling import CLOCKS
 from vedette.platforms.velocity import WithVelocity
 from vedette.platforms.wrapper import PlatformWrapper
 from vedette.scenarios.loading import Scenario
@@ -46,7 +45,7 @@ def build_sensors(scenario: Scenario) -> tuple[MobileSensor, ...]:
     )
     sensors = []
     for sensor in model.sensors:
-        assumed = sensor.build(region, method, folder, model.filter.detection_at)
+        assumed = sensor.build(region, method, folder, model.motion.components, model.filter.detection_at)
         local = model.filter.build(targets, assumed, folder)
         _check_custom_parts(scenario, sensor, assumed, local)
         sensors.append(MobileSensor(local, _platform(model, sensor, folder), _scan_times(model, sensor)))
@@ -115,7 +114,8 @@ def build_true_sensors(scenario: Scenario, assumed: Sequence[SensorModel]) -> tu
     model = scenario.model
     region = model.region.build()
     pairs = zip(model.sensors, assumed, strict=True)
-    return tuple(section.build_true(sensor, region, scenario.folder) for section, sensor in pairs)
+    given = region, scenario.folder, model.motion.components
+    return tuple(section.build_true(sensor, *given) for section, sensor in pairs)
 
 
 def scan_loss_probabilities(scenario: Scenario) -> tuple[float, ...]:
@@ -134,7 +134,7 @@ def build_poses(scenario: Scenario) -> Floats:
     """Return the poses at the start, (num_sensors, pose_dim), padded with zeros to the longest."""
     sensors, visits = scenario.model.sensors, scenario.model.control.revisit()
     poses = [sensor.pose if scenario.model.recording else sensor.turning_pose for sensor in sensors]
-    longest = max(map(len, poses)) if visits is None else CLOCKS
+    longest = max(map(len, poses)) if visits is None else VISITS
     padded = np.array([(*pose, *(0.0,) * (longest - len(pose))) for pose in poses])
     if visits is None:
         return padded

@@ -114,7 +114,7 @@ class Birth(Section):
         """Return the births, shared by all sensors. region: of births from measurements."""
         from vedette.models import BirthModel, MeasurementBirth
 
-        order, dim, num = grouped_order(motion), motion.state_dim, len(self.sites)
+        order, dim, num = grouped_order(motion), len(motion.components), len(self.sites)
         measured = self.from_measurements
         return BirthModel(
             np.array([site.existence for site in self.sites]),

@@ -6,12 +6,12 @@ from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
 from vedette.internal.quantities import PLACED, is_doppler
+from vedette.kernels.base.types import PLANE
 from vedette.scenarios.diagnostics import Finding, Path, describe
 from vedette.scenarios.sections.deciding import Lookahead, Revisit
 from vedette.scenarios.sections.fusion import LABEL_FUSIONS, SCAN_FUSIONS, Fusion
 from vedette.scenarios.sections.planners import NamedJointWithTruth, NamedOracle
 from vedette.scenarios.sections.strategies import LookaheadStrategy, Strategy
-from vedette.scenarios.sections.targets import RECORDED_DIM
 from vedette.scenarios.sections.tracking import LABELLING, UNLABELLED
 
 if TYPE_CHECKING:
@@ -52,7 +52,7 @@ def births_from_measurements(model: ScenarioFields) -> Iterator[Finding]:
     measured, fusion = model.birth.from_measurements, model.fusion
     if measured is None:
         return
-    path, dim = ("birth", "from_measurements"), model.motion.state_dim
+    path, dim = ("birth", "from_measurements"), len(model.motion.components)
     if len(measured.std) != dim:
         yield (*path, "std"), f"{dim} numbers, as a state under motion has", describe(measured.std)
     if model.filter.kind in UNLABELLED:
@@ -164,11 +164,11 @@ def _missing_truth(model: ScenarioFields) -> str:
     motion = model.motion
     if model.targets.kind == "unknown":
         return "one that does not know the targets, as these are unknown"
-    if model.targets.kind != "recorded" or motion.kind != "custom" or motion.state_dim == RECORDED_DIM:
+    if model.targets.kind != "recorded" or motion.kind != "custom" or len(motion.components) == len(PLANE):
         return ""
     return (
-        f"another kind, as states have {motion.state_dim} components under motion and the recorded targets "
-        f"{RECORDED_DIM} (a motion of {RECORDED_DIM} components, or targets that are simulated, would do)"
+        f"another kind, as states have {len(motion.components)} components under motion and the recorded targets "
+        f"{len(PLANE)} (a motion of {len(PLANE)} components, or targets that are simulated, would do)"
     )
 
 

@@ -6,6 +6,7 @@ import math
 from collections.abc import Sequence
 from typing import NamedTuple
 
+from vedette.kernels.base.types import HALF_WIDTH, HEADING, POINTING
 from vedette.scenarios.sections.sensors import Sensor
 
 _MIN_DETECTION = 0.01  # share of the probability of a soft sector below which detection is neglected
@@ -27,13 +28,13 @@ def field_of_view(sensor: Sensor, pose: Sequence[float] | None = None) -> FieldO
     """
     section, at = sensor.detection, sensor.pose if pose is None else pose
     if section.kind == "limited_range":
-        return FieldOfView(at[2], math.pi, section.max_range, section.probability)
+        return FieldOfView(at[HEADING], math.pi, section.max_range, section.probability)
     if section.kind in ("limited_sector", "soft_sector"):
-        return FieldOfView(at[2], math.radians(section.half_width_deg), section.max_range, section.probability)
+        return FieldOfView(at[HEADING], math.radians(section.half_width_deg), section.max_range, section.probability)
     if section.kind == "camera" and len(at) >= 5:
-        reference, width = section.reference_half_width_deg, at[4]
+        reference, width = section.reference_half_width_deg, at[HALF_WIDTH]
         reach = section.max_range * (math.radians(reference) / width if reference is not None and width > 0.0 else 1.0)
-        return FieldOfView(at[3], width, reach, section.probability)
+        return FieldOfView(at[POINTING], width, reach, section.probability)
     return None
 
 

@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 import numpy as np
 from pydantic import Field, field_validator
 
-from vedette.internal.quantities import HEIGHT_DEPENDENT
 from vedette.scenarios.diagnostics import Finding, describe
 from vedette.scenarios.sections.base import Chance, Name, Section, check
 from vedette.scenarios.sections.birth import Birth
@@ -210,12 +209,6 @@ class ScenarioFields(Section):
         if not missing:
             return estimator  # the section itself, by which faults find their place
         return estimator.model_copy(update={name: getattr(self.ospa, name) for name in missing})
-
-    @property
-    def has_heights(self) -> bool:
-        """True if states are [px, py, vx, vy, pz, vz]."""
-        depends = any(sensor.measurement.kind in HEIGHT_DEPENDENT for sensor in self.sensors)
-        return depends or self.motion.kind == "constant_velocity_height"
 
     @property
     def decision_steps(self) -> tuple[int, ...]:

@@ -12,7 +12,7 @@ import numpy as np
 
 from vedette.internal.covariances import covariance_fault
 from vedette.internal.quantities import COMPONENTS, HEIGHT_DEPENDENT
-from vedette.kernels.base.types import HEIGHT
+from vedette.kernels.base.types import HEIGHT, PLANE
 from vedette.scenarios.diagnostics import Finding, Path, describe
 from vedette.scenarios.sections.base import check, readable_findings
 from vedette.scenarios.sections.birth import BirthSite
@@ -21,7 +21,6 @@ from vedette.scenarios.sections.consistency import CONSISTENCY_CHECKS, incompati
 from vedette.scenarios.sections.fields import ScenarioFields
 from vedette.scenarios.sections.fusion import LMB_FUSIONS, SCAN_FUSIONS
 from vedette.scenarios.sections.places import misplaced_findings
-from vedette.scenarios.sections.targets import RECORDED_DIM
 from vedette.scenarios.sections.tracking import LABELLING, UNLABELLED
 from vedette.scenarios.sections.undetected_intensity import cells_of_undetected, learnt_births
 from vedette.scenarios.sections.world import TIME_TOLERANCE
@@ -121,9 +120,9 @@ class ScenarioModel(ScenarioFields):
     def _heights(self) -> Iterator[Finding]:
         """Yield faults if measurements depend on a height but states of the filters or the true targets have none."""
         others = ", ".join(each for each in COMPONENTS if each not in HEIGHT_DEPENDENT)
-        wanted = f"one of {others}, or motion: constant_velocity_height (as targets have no height)"
+        wanted = f"one of {others}, or a motion with {HEIGHT} (as targets have {', '.join(self.motion.components)})"
         for i, kind in enumerate([sensor.measurement.kind for sensor in self.sensors]):
-            if kind in HEIGHT_DEPENDENT and self.motion.kind not in ("constant_velocity_height", "custom"):
+            if kind in HEIGHT_DEPENDENT and HEIGHT not in self.motion.components:
                 yield ("sensors", i, "measurement", "kind"), wanted, describe(kind)
 
     @check
@@ -146,7 +145,7 @@ class ScenarioModel(ScenarioFields):
         if self.targets.kind == "poisson":
             for name in ("mean", "std"):
                 yield from readable_findings(_state_length(("targets", name), self.targets, name, self))
-        if self.targets.kind == "uniform" and len(self.targets.std) != (rest := self.motion.state_dim - 2):
+        if self.targets.kind == "uniform" and len(self.targets.std) != (rest := len(self.motion.components) - 2):
             wanted = f"{rest} numbers, as a state under motion has but the position"
             yield ("targets", "std"), wanted, describe(self.targets.std)
         if self.targets.kind != "scripted":
@@ -197,10 +196,10 @@ class ScenarioModel(ScenarioFields):
         for name in ("first_scan", "last_scan"):
             yield from readable_findings(_last_step(("ospa", name), self.ospa, name, self))
         components, motion = self.ospa.components, self.motion
-        if components == "state" and self.targets.kind == "recorded" and motion.state_dim != RECORDED_DIM:
-            wanted = f"position, as states have {motion.state_dim} components and recorded targets {RECORDED_DIM}"
+        if components == "state" and self.targets.kind == "recorded" and len(motion.components) != len(PLANE):
+            wanted = f"position, as states have {len(motion.components)} components and recorded targets {len(PLANE)}"
             yield ("ospa", "components"), wanted, '"state"'
-        if components == "position_and_height" and motion.state_dim <= HEIGHT + 1:
+        if components == "position_and_height" and HEIGHT not in motion.components:
             yield ("ospa", "components"), "position, as targets have no height", '"position_and_height"'
 
     @check
@@ -219,7 +218,7 @@ def _up_to_last(path: Path, step: int | None, last: int) -> Iterator[Finding]:
 
 
 def _state_length(path: Path, holder: Any, field: str, model: ScenarioFields) -> Iterator[Finding]:
-    values, dim = getattr(holder, field), model.motion.state_dim
+    values, dim = getattr(holder, field), len(model.motion.components)
     if values is not None and len(values) != dim:
         yield path, f"{dim} numbers, as a state under motion has", describe(values)
 
@@ -228,7 +227,7 @@ def _covariance(path: Path, site: BirthSite, model: ScenarioFields) -> Iterator[
     if site.cov is None:
         return
     rows: Sequence[Sequence[float]] = site.cov
-    dim = model.motion.state_dim
+    dim = len(model.motion.components)
     if len(rows) != dim or any(len(row) != dim for row in rows):
         shape = f"rows of {', '.join(str(len(row)) for row in rows)}" if len(rows) == dim else describe(rows)
         yield path, f"{dim} rows of {dim} numbers", shape

@@ -12,7 +12,7 @@ from pydantic import Field, create_model
 
 from vedette.internal.quantities import HEIGHT_DEPENDENT, is_doppler
 from vedette.internal.unit_warnings import suppress_unit_warnings
-from vedette.kernels.base.types import BEAM, OWN_HEIGHT
+from vedette.kernels.base.types import BEAM, BUDGET, OWN_HEIGHT
 from vedette.scenarios.diagnostics import Finding, describe
 from vedette.scenarios.sections.base import (
     GaussianMethod,
@@ -36,7 +36,7 @@ from vedette.scenarios.sections.sensing import (
     clutter_findings,
     noise_findings,
 )
-from vedette.scenarios.sections.true_sensors import BiasSection, TrueSensor, build_parts
+from vedette.scenarios.sections.true_sensors import BiasSection, Names, TrueSensor, build_parts
 
 if TYPE_CHECKING:  # importing the models imports the compiler, which a check does not need
     from vedette.models import ClassFeatures, Region, SensorModel
@@ -273,7 +273,7 @@ class Sensor(Section):
         """Pose at the start: [px, py, heading_rad], and further components of its platform."""
         pose = (*self.position, math.radians(self.heading_deg), *self.platform.components())
         if self.budget is not None:
-            pose = (*pose, *(0.0,) * (5 - len(pose)), self.budget.seconds)
+            pose = (*pose, *(0.0,) * (BUDGET - len(pose)), self.budget.seconds)
         # A custom platform may have a velocity at the start.
         pose = (*pose, *(0.0,) * (BEAM - len(pose))) if self.needs_velocity else pose
         return (*pose, *(0.0,) * (OWN_HEIGHT - len(pose)), self.height) if self.height else pose
@@ -291,7 +291,7 @@ class Sensor(Section):
         return (*self.pose[:BEAM], 0.0, self.turn.build().rate, *self.pose[OWN_HEIGHT:])
 
     def build(
-        self, region: Region, method: GaussianMethod, folder: Path, detection_at: str | None = None
+        self, region: Region, method: GaussianMethod, folder: Path, state: Names, detection_at: str | None = None
     ) -> SensorModel:
         """Return the model of the sensor in the filters; the file of a custom model is relative to `folder`.
 
@@ -300,17 +300,17 @@ class Sensor(Section):
         """
         from vedette.models import SensorModel
 
-        parts = build_parts(self, self.measurement, region, folder)
+        parts = build_parts(self, self.measurement, region, folder, state)
         with suppress_unit_warnings():
             return SensorModel(**parts, method=method, detection_at=detection_at)
 
-    def build_true(self, known: SensorModel, region: Region, folder: Path) -> TrueSensorModel:
+    def build_true(self, known: SensorModel, region: Region, folder: Path, state: Names) -> TrueSensorModel:
         """Return the true sensor for the model in the filters; raises like `build`."""
         from vedette.simulation.true_sensors import TrueSensor as Made
 
         if self.true_parameters is None:
             return Made(known)
-        made = self.true_parameters.build(known, self.measurement, self.bias, region, folder)
+        made = self.true_parameters.build(known, self, region, folder, state)
         # The bias of a compass is clockwise; simulated bearings are from the east.
         return replace(made, bias=replace(made.bias, bearing=-made.bias.bearing)) if self.compass else made
 

@@ -36,9 +36,6 @@ if TYPE_CHECKING:  # importing the models imports the compiler, which a check do
     from vedette.simulation import ScriptedTargets as ScriptedSource
     from vedette.simulation import UniformTargets as UniformSource
 
-# Components of the state of a recorded target: position and velocity.
-RECORDED_DIM = 4
-
 
 def _negative_stds(stds: Sequence[float]) -> Iterator[Finding]:
     for i, std in enumerate(stds):

@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any, Literal, TypeAlias
 
 from pydantic import Field
 
@@ -30,12 +30,18 @@ if TYPE_CHECKING:  # importing the models imports the compiler, which a check do
     from vedette.simulation import TrueSensor as TrueSensorModel
 
 
-def build_parts(section: Any, like: Measurement, region: Region, folder: Path, known: Any = None) -> dict[str, Any]:
+Names: TypeAlias = tuple[str, ...]  # of the components of a state
+
+
+def build_parts(
+    section: Any, like: Measurement, region: Region, folder: Path, state: Names, known: Any = None
+) -> dict[str, Any]:
     """Return the models of measurement, noise, detection and clutter that a section gives, by these names.
 
-    like: the measurement to which noise and clutter apply. known: the measurement model if the section gives none.
+    like: the measurement to which noise and clutter apply. state: components of the motion. known: the measurement
+    model if the section gives none.
     """
-    model = known if section.measurement is None else section.measurement.build(folder)
+    model = known if section.measurement is None else section.measurement.build(folder, state_components=state)
     given = {"measurement": model, "angular": model.angular, "kind": like.kind, "region": region}
     found = {name: part for name in ("noise", "detection", "clutter") if (part := getattr(section, name)) is not None}
     folded = getattr(like, "max_unambiguous_range_rate", None)
@@ -118,10 +124,8 @@ class TrueSensor(Section):
         """Return the measurement for noise and clutter: the filters' or, in place of a custom one, the true one."""
         return known if self.measurement is None or known.kind != "custom" else self.measurement
 
-    def build(
-        self, known: SensorModel, measurement: Measurement, bias: BiasSection, region: Region, folder: Path
-    ) -> TrueSensorModel:
-        """Return the true sensor, given the filters' model, the section of their measurement, and the bias they remove.
+    def build(self, known: SensorModel, sensor: Any, region: Region, folder: Path, state: Names) -> TrueSensorModel:
+        """Return the true sensor, given the filters' model and the section of the sensor. state: see `build_parts`.
 
         Raises:
             InputError: a custom model that cannot be loaded, or parts that do not fit together.
@@ -129,11 +133,11 @@ class TrueSensor(Section):
         from vedette.models.bias import NO_BIAS
         from vedette.simulation.true_sensors import TrueSensor as Made
 
-        like = self._like(measurement)
-        parts = build_parts(self, like, region, folder, known.measurement)
+        like = self._like(sensor.measurement)
+        parts = build_parts(self, like, region, folder, state, known.measurement)
         with suppress_unit_warnings():
             # The filters' method may need a Jacobian; nothing is filtered with this model.
             model = replace(known, method="auto", **parts)
         first = None if self.first_detection is None else self.first_detection.build(folder)
-        left = NO_BIAS if self.bias is None else self.bias.build() - bias.build()
+        left = NO_BIAS if self.bias is None else self.bias.build() - sensor.bias.build()
         return Made(model, first, self.detection_of, left)

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Annotated, ClassVar, Literal
 import numpy as np
 from pydantic import Field
 
+from vedette.kernels.base.types import STATE_COMPONENTS
 from vedette.scenarios.diagnostics import Finding, describe
 from vedette.scenarios.sections.base import GaussianMethod, Positive, Section, Whole, check
 from vedette.scenarios.sections.custom import Custom, MissingMember
@@ -79,19 +80,16 @@ class _Motion(Part):
     state_order: StateOrder = "grouped"
 
     @property
-    def state_dim(self) -> int:
-        """Number of components of a state."""
-        return STATE_DIMS[self.kind]
-
-
-STATE_DIMS = {"constant_velocity": 4, "coordinated_turn": 5, "constant_velocity_height": 6}
+    def components(self) -> tuple[str, ...]:
+        """Names of the components of a state."""
+        return STATE_COMPONENTS[self.kind]
 
 
 class CustomMotion(Custom):
     """A user's `MotionModel`."""
 
     kind: Literal["custom"] = Field(default="custom", description="Kind of motion [-].")
-    state_dim: Annotated[Whole, Field(ge=2, le=100, description="Number of components of its state [-].")]
+    components: tuple[str, ...] = Field(strict=False, min_length=2, description="Components of its state, by name [-].")
     gives: ClassVar[str] = "vedette.models:MotionModel"
 
     @property
@@ -102,15 +100,15 @@ class CustomMotion(Custom):
     def build(self, folder: Path, method: GaussianMethod = "auto") -> MotionModel:
         """Return the motion model.
 
-        Raises `InputError` if its state dimension differs from the given one, or its state has another order.
+        Raises `InputError` if the components of its state differ from the given ones, or have another order.
         """
         from vedette.models.motion import STATE_ORDER
 
         motion: MotionModel = self.instantiate(folder)
-        if motion.state_dim != self.state_dim:
-            raise MissingMember(self, "state_dim", f"that of {self.function}, {motion.state_dim}", str(self.state_dim))
-        fault = motion.velocity_fault()
-        if fault is not None:
+        if motion.components != self.components:
+            wanted = f"those of {self.function}, {', '.join(motion.components)}"
+            raise MissingMember(self, "components", wanted, ", ".join(self.components))
+        if (fault := motion.velocity_fault()) is not None:
             raise MissingMember(self, "function", f"a state {STATE_ORDER}", fault)
         return motion if method == "auto" else replace(motion, method=method)
 
@@ -126,5 +124,5 @@ else:
 def grouped_order(motion: Motion) -> list[int]:
     """Return the index in the file's states of each component of the library's states [px, py, vx, vy, ...]."""
     if motion.state_order == "grouped":
-        return list(range(motion.state_dim))
-    return [0, 2, 1, 3, *range(4, motion.state_dim)]
+        return list(range(len(motion.components)))
+    return [0, 2, 1, 3, *range(4, len(motion.components))]
