@@ -179,9 +179,10 @@ def bare_places(source: str) -> list[int]:
         if not isinstance(node, ast.Subscript):
             continue
         name = node.value.attr if isinstance(node.value, ast.Attribute) else getattr(node.value, "id", "")
-        own = [leaf for leaf in ast.walk(node.slice) if isinstance(leaf, ast.Constant) and type(leaf.value) is int]
-        is_range = isinstance(node.slice, ast.Slice) and [leaf.value for leaf in own] == [2, 4]
-        if is_range or (name in NAMES and any(leaf.value >= 2 for leaf in own if leaf in flat(node.slice))):
+        constants = [leaf for leaf in ast.walk(node.slice) if isinstance(leaf, ast.Constant)]
+        own = [(leaf, leaf.value) for leaf in constants if type(leaf.value) is int]
+        is_range = isinstance(node.slice, ast.Slice) and [value for _, value in own] == [2, 4]
+        if is_range or (name in NAMES and any(value >= 2 for leaf, value in own if leaf in flat(node.slice))):
             lines.append(node.lineno)
     return lines
 

@@ -106,7 +106,7 @@ def test_bad_true_sensors_are_named():
     with pytest.raises(InputError, match="detection_of: expected state, as only a position"):
         TrueSensor(bearing, detection_of="measurement")
     with pytest.raises(InputError, match="detection_of: expected one of state, measurement; got both"):
-        TrueSensor(bearing, detection_of="both")
+        TrueSensor(bearing, detection_of="both")  # type: ignore[arg-type]
     with pytest.raises(InputError, match="first_detection: expected a DetectionModel; got float"):
         TrueSensor(bearing, first_detection=1.0)  # type: ignore[arg-type]
     with pytest.raises(InputError, match=r"bias.range: expected 0, as no range is measured; got 3"):
