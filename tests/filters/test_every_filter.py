@@ -180,7 +180,7 @@ def test_parts_that_do_not_fit(kind: Any) -> None:
     for parts, message in (
         ({"birth": birth(dim=5)}, r"birth\.means: expected states of dimension 4, as the motion model; got 5"),
         ({"motion": "straight on"}, "motion: expected a MotionModel; got str"),
-        ({"birth": None}, "birth: expected a BirthModel; got NoneType"),
+        ({"birth": None}, "birth: expected a BirthModel; got None"),
         ({"survival": 0.9}, "survival: expected a SurvivalModel; got float"),
     ):
         with pytest.raises(InputError, match=message):
@@ -233,7 +233,7 @@ def test_births_must_be_new(kind: Any) -> None:
     ("kind", "field", "value", "message"),
     [
         (DeltaGlmbFilter, "assignment", "murty", "assignment: expected RankedAssignment or Gibbs; got str"),
-        (FactoredGlmbFilter, "max_split_error", 3.0, "max_split_error: expected at most 2"),
+        (FactoredGlmbFilter, "max_split_error", 3.0, "max_split_error: expected a number from 0 to 2"),
         (FactoredGlmbFilter, "max_factor_labels", 0, "max_factor_labels"),
     ],
 )

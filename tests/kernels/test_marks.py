@@ -13,6 +13,7 @@ import vedette
 SRC = Path(vedette.__file__).parents[1]
 KERNELS = Path("vedette", "kernels")
 CLASSES_ALONE = "    if out.log_class_probs.shape[1] == 0:\n        return"
+POOLED = "    for k in range(out.log_class_probs.shape[1]):\n        out.log_class_probs[target, k] = 0.0\n"
 
 # The column `number`: components of different numbers are of different targets, and do not merge.
 EDITS = {
@@ -24,7 +25,7 @@ EDITS = {
     ],
     KERNELS / "gaussian" / "marks.py": [
         ("Marks(np.empty((num, marks.", "Marks(np.empty((num, marks.number.shape[1])), np.empty((num, marks."),
-        ("Marks(np.empty((num, num_class", "Marks(np.empty((num, 0)), np.empty((num, num_class"),
+        ("Marks(np.empty((num, measurements", "Marks(np.empty((num, 0)), np.empty((num, measurements"),
         ("Marks(np.empty((num, 0)))", "Marks(np.empty((num, 0)), np.empty((num, 0)))"),
         ("Marks(marks.log_class_probs[first", "Marks(marks.number[first:last], marks.log_class_probs[first"),
         ("    for k in range(min(", "{copy}    for k in range(min("),
@@ -33,7 +34,7 @@ EDITS = {
             "    return marks.number.shape[1] == 0 or marks.number[first, 0] == marks.number[second, 0]",
         ),
         (f"{CLASSES_ALONE}\n", f"{{first}}{CLASSES_ALONE}\n"),
-        (f"{CLASSES_ALONE} 0.0\n    for", f"{{first}}{CLASSES_ALONE} 0.0\n    for"),
+        (f"{CLASSES_ALONE} 0.0\n{POOLED}", f"{{first}}{CLASSES_ALONE} 0.0\n{POOLED}"),
     ],
 }
 INSERTED = {

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import Any, ClassVar, Protocol, TypeAlias, runtime_checkable
+from typing import Annotated, Any, ClassVar, Protocol, TypeAlias, runtime_checkable
 
 import numpy as np
 
@@ -131,8 +131,10 @@ JointAssociation: TypeAlias = RankedAssignment | Gibbs
 Assignment: TypeAlias = JointAssociation | MarginalAssociation
 
 
-def check_marginals(value: Any) -> None:
-    """Raise `InputError` unless an LMB filter can use this association method."""
+def _check_marginals(field: str, value: Any) -> None:
     if not isinstance(value, MarginalAssociation):
         expected = "RankedAssignment, BeliefPropagation, CustomMarginals or another with to_kernel()"
-        raise InputError(f"assignment: expected {expected}; got {type(value).__name__}")
+        raise InputError(f"{field}: expected {expected}; got {type(value).__name__}")
+
+
+LmbAssociation = Annotated[MarginalAssociation, _check_marginals]  # field of an LMB filter

@@ -11,10 +11,10 @@ import numpy as np
 
 from vedette.densities import LMB
 from vedette.errors import NumericalError
-from vedette.filters.assignment import MarginalAssociation, RankedAssignment, check_marginals
+from vedette.filters.assignment import LmbAssociation, RankedAssignment
 from vedette.filters.base import LabelledFilter, LabelledFilterBase, SensorStep, blind_sensor
 from vedette.filters.limits import Limits
-from vedette.filters.multi_sensor import MultiSensorFilter, SequentialUpdate
+from vedette.filters.multi_sensor import SequentialUpdate
 from vedette.filters.protocols import Filter, FilterInfo
 from vedette.kernels.association.marginals import Association
 from vedette.kernels.base.types import Bools, Ints, Lmb
@@ -72,11 +72,7 @@ class LmbFilter(LmbFilterBase, LabelledFilter[LMB]):
         InputError: a part of another kind.
     """
 
-    assignment: MarginalAssociation = field(default_factory=RankedAssignment)
-
-    def __post_init__(self) -> None:
-        LabelledFilter.__post_init__(self)  # super() fails here, as slots=True replaces the class
-        check_marginals(self.assignment)
+    assignment: LmbAssociation = field(default_factory=RankedAssignment)
 
     def _blind(self) -> LmbFilter:
         return LmbFilter(self.targets, blind_sensor(), Limits.none())
@@ -102,11 +98,7 @@ class SequentialLmbFilter(LmbFilterBase, SequentialUpdate[LMB]):
     Attributes and errors: as `MultiSensorGlmbFilter`, and `assignment` as in `LmbFilter`.
     """
 
-    assignment: MarginalAssociation = field(default_factory=RankedAssignment)
-
-    def __post_init__(self) -> None:
-        MultiSensorFilter.__post_init__(self)  # super() fails here, as slots=True replaces the class
-        check_marginals(self.assignment)
+    assignment: LmbAssociation = field(default_factory=RankedAssignment)
 
     def _run_kernel(self, prior: Lmb, step: SensorStep) -> tuple[Lmb, LmbReport]:
         association = self.assignment.to_kernel()
