@@ -8,7 +8,7 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 
-from vedette.evaluation.health import HealthSummary, health_sums, percent, summarise_health
+from vedette.evaluation.health import HealthSums, health_sums, percent
 from vedette.internal.text import pluralise
 from vedette.kernels.base.types import Floats
 from vedette.kernels.labelled.set_fusion import LOST, SURE
@@ -41,7 +41,7 @@ class Diagnostic(NamedTuple):
 
 def run_diagnostics(health: Health, sensors: Sequence[str] = ()) -> tuple[Diagnostic, ...]:
     """Return every diagnostic of one run. sensors: their names."""
-    return diagnostics(summarise_health(health_sums([health]), sensors))
+    return diagnostics(health_sums([health]), sensors)
 
 
 def record_diagnostics(record: RunRecord, scenario: Scenario | None) -> tuple[Diagnostic, ...]:
@@ -63,9 +63,13 @@ def diagnostics_line(results: Sequence[Diagnostic]) -> str:
     return "; ".join(shown) or "no limit reached, nothing truncated"
 
 
-def diagnostics(health: HealthSummary) -> tuple[Diagnostic, ...]:
-    """Return every diagnostic of some runs, those of the fusion first."""
-    return (*_fusion_diagnostics(health), *_filter_diagnostics(health), *_measurement_diagnostics(health))
+def diagnostics(health: HealthSums, sensors: Sequence[str] = ()) -> tuple[Diagnostic, ...]:
+    """Return every diagnostic of some runs, those of the fusion first. sensors: names, by default `sensor 1` and so on.
+
+    A scan counts in a share if the event happened at any sensor.
+    """
+    names = sensors or [f"sensor {number + 1}" for number in range(len(health.unknown_labels))]
+    return (*_fusion_diagnostics(health, names), *_filter_diagnostics(health), *_measurement_diagnostics(health))
 
 
 def _level(value: float, check_above: float = 0.0) -> Level:
@@ -87,20 +91,21 @@ def _worst(shares: Floats, names: Sequence[str]) -> str:
     return f"{percent(float(shares[worst]))} at {names[worst]}" if shares[worst] else "0 %"
 
 
-def _fusion_diagnostics(health: HealthSummary) -> Iterator[Diagnostic]:
-    max_lost = f", up to {pluralise(health.worst_lost, 'target')}" if health.lost else ""
+def _fusion_diagnostics(health: HealthSums, sensors: Sequence[str]) -> Iterator[Diagnostic]:
+    lost, disjoint = health.lost / health.num_scans, health.disjoint / health.num_scans
+    max_lost = f", up to {pluralise(int(health.worst_lost), 'target')}" if lost else ""
     yield Diagnostic(
         "Targets lost by fusion",
         f"A label with an existence probability of {SURE:g} or more at one sensor has less than {LOST:g} after fusion, "
         "because another sensor lacks it or does not see there.",
-        f"{_scans(health.lost)}{max_lost}",
-        _level(health.lost, _CHECK_ABOVE),
+        f"{_scans(lost)}{max_lost}",
+        _level(lost, _CHECK_ABOVE),
     )
     yield Diagnostic(
         "No common label set",
         "No label set is held by every sensor.",
-        _scans(health.disjoint),
-        _level(health.disjoint),
+        _scans(disjoint),
+        _level(disjoint),
     )
     yield Diagnostic(
         "Fused weight truncated",
@@ -111,18 +116,18 @@ def _fusion_diagnostics(health: HealthSummary) -> Iterator[Diagnostic]:
     yield Diagnostic(
         "Label sets missing at a sensor",
         "Share of the fused label sets (CLMB: labels) that a sensor lacks, for the sensor that lacks most.",
-        _worst(health.missing_sets, health.sensors),
-        _level(float(health.missing_sets.max()), math.inf),
+        _worst(health.num_missing_sets / max(1, health.num_sets), sensors),
+        _level(float(health.num_missing_sets.max()), math.inf),
     )
     yield Diagnostic(
         "Labels unknown to a sensor",
         "Share of the scans at which a sensor lacks a label that another sensor has.",
-        _worst(health.unknown_labels, health.sensors),
+        _worst(health.unknown_labels / health.num_scans, sensors),
         _level(float(health.unknown_labels.max()), math.inf),
     )
 
 
-def _filter_diagnostics(health: HealthSummary) -> Iterator[Diagnostic]:
+def _filter_diagnostics(health: HealthSums) -> Iterator[Diagnostic]:
     yield Diagnostic(
         "Posterior truncated",
         "The filter reached its limits, or left out improbable hypotheses. The weight is an upper bound, and "
@@ -133,16 +138,16 @@ def _filter_diagnostics(health: HealthSummary) -> Iterator[Diagnostic]:
     yield Diagnostic(
         "Association search cut short",
         "The ranking of associations stopped at max_search_nodes.",
-        _scans(health.search_truncated),
+        _scans(health.search_truncated / health.num_scans),
         _level(health.search_truncated),
     )
     yield Diagnostic(
         "Cluster approximated",
         "An LMB cluster was too large for an exact sum; the heaviest joint choices were summed.",
-        _scans(health.inexact),
+        _scans(health.inexact / health.num_scans),
         _level(health.inexact),
     )
-    worst, mean = health.worst_factoring / 2.0, health.mean_factoring / 2.0
+    worst, mean = health.worst_factoring / 2.0, health.factoring / max(1, health.num_factoring) / 2.0
     is_known = not math.isnan(worst)
     yield Diagnostic(
         "Independence error",
@@ -158,23 +163,27 @@ def _filter_diagnostics(health: HealthSummary) -> Iterator[Diagnostic]:
     )
 
 
-def _truncation(health: HealthSummary) -> str:
+def _truncation(health: HealthSums) -> str:
     if math.isnan(health.worst_discarded):
         weight = "weight not known"
     elif health.worst_discarded:
-        weight = f"weight {_bound(health.worst_discarded)} (mean {_bound(health.mean_discarded)})"
+        weight = f"weight {_bound(health.worst_discarded)} (mean {_bound(health.discarded / health.num_discarded)})"
     else:
         weight = "weight 0 %"
-    return f"{weight}, limit reached at {_scans(health.limit_reached)}" if health.limit_reached else weight
+    return (
+        f"{weight}, limit reached at {_scans(health.limit_reached / health.num_scans)}"
+        if health.limit_reached
+        else weight
+    )
 
 
-def _truncation_level(health: HealthSummary) -> Level:
+def _truncation_level(health: HealthSums) -> Level:
     if health.worst_discarded > 0.0:  # neither zero nor unknown
         return _level(health.worst_discarded, _CHECK_ABOVE)
     return "check" if health.limit_reached else "note" if math.isnan(health.worst_discarded) else "ok"
 
 
-def _measurement_diagnostics(health: HealthSummary) -> Iterator[Diagnostic]:
+def _measurement_diagnostics(health: HealthSums) -> Iterator[Diagnostic]:
     yield Diagnostic(
         "Repeated measurements",
         "Measurements that repeat another one and were left out.",

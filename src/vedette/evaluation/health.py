@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -16,28 +15,45 @@ from vedette.simulation.health import Health
 class HealthSums(NamedTuple):
     """Reports of filters and fusion over all scans of some runs: numbers of scans, sums, and worst values.
 
-    A scan counts once if the event happened at any sensor. The worst of no value is -inf.
+    A scan counts once if the event happened at any sensor. The worst of no value is NaN.
+
+    Attributes:
+        num_scans: of all runs.
+        limit_reached, search_truncated, inexact: scans at which a filter reached a limit, its ranking search was cut
+            short, an LMB cluster was not summed exactly.
+        discarded, num_discarded, worst_discarded: upper bound on the share of a filter's weight that was truncated, sum
+            over scans and sensors with a known value, and their number.
+        factoring, num_factoring, worst_factoring: the same of the L1 error of a factored filter from treating labels as
+            independent.
+        worst_dropped: expected number of targets in labels that a filter dropped at one scan.
+        duplicates, clutter_raised: numbers of measurements.
+        num_missing_sets: (num_sensors,) fused label sets (CLMB: labels) that the sensor lacks, of `num_sets`.
+        unknown_labels: (num_sensors,) scans at which the sensor lacks a label that another one has.
+        lost: scans at which the fusion lost a label that a sensor was sure of.
+        worst_lost: most such labels at a scan.
+        disjoint: scans at which no label set is held by every sensor.
+        worst_fusion_discarded: most weight that the fusion truncated.
     """
 
     num_scans: int
-    limit_reached: int  # scans
-    search_truncated: int  # scans
-    inexact: int  # scans
-    discarded: float  # sum over scans and sensors with a known value
-    num_discarded: int  # of these
+    limit_reached: int
+    search_truncated: int
+    inexact: int
+    discarded: float
+    num_discarded: int
     worst_discarded: float
-    factoring: float  # sum over scans and sensors with a known value
-    num_factoring: int  # of these
+    factoring: float
+    num_factoring: int
     worst_factoring: float
     worst_dropped: float
     duplicates: int
     clutter_raised: int
-    num_missing_sets: Floats  # (num_sensors,)
+    num_missing_sets: Floats
     num_sets: int
-    unknown_labels: Floats  # (num_sensors,) scans
-    lost: int  # scans
+    unknown_labels: Floats
+    lost: int
     worst_lost: float
-    disjoint: int  # scans
+    disjoint: int
     worst_fusion_discarded: float
 
 
@@ -77,7 +93,7 @@ def health_sums(healths: Sequence[Health]) -> HealthSums:
 
 def _sum_and_worst(values: Floats) -> tuple[float, int, float]:
     known = values[~np.isnan(values)]
-    return float(known.sum()), len(known), float(known.max(initial=-np.inf))
+    return float(known.sum()), len(known), float(np.fmax.reduce(known, initial=np.nan))
 
 
 def add_health_sums(parts: Sequence[HealthSums]) -> HealthSums:
@@ -86,79 +102,10 @@ def add_health_sums(parts: Sequence[HealthSums]) -> HealthSums:
         raise InputError("records: expected one run or more, of equally many sensors")
     columns = dict(zip(HealthSums._fields, zip(*parts, strict=True), strict=True))
     return HealthSums(
-        **{name: max(values) if name.startswith("worst_") else sum(values) for name, values in columns.items()}
-    )
-
-
-@dataclass(frozen=True, slots=True)
-class HealthSummary:
-    """Summary over all scans of some runs. A scan counts in a share if the event happened at any sensor.
-
-    Attributes:
-        num_scans: of all runs.
-        limit_reached, search_truncated, inexact: share of the scans at which a filter reached a limit, its ranking
-            search was cut short, an LMB cluster was not summed exactly.
-        mean_discarded, worst_discarded: upper bound on the share of a filter's weight that was truncated, or NaN if
-            unknown.
-        mean_factoring, worst_factoring: upper bound on the L1 error of a factored filter from treating labels as
-            independent, or NaN if unknown.
-        worst_dropped: expected number of targets in labels that a filter dropped at one scan.
-        duplicates, clutter_raised: total numbers of measurements.
-        missing_sets: (num_sensors,) share of the fused label sets (CLMB: labels) that the sensor lacks.
-        unknown_labels: (num_sensors,) share of the scans at which the sensor lacks a label that another one has.
-        lost: share of the scans at which the fusion lost a label that a sensor was sure of.
-        worst_lost: most such labels at a scan.
-        disjoint: share of the scans at which no label set is held by every sensor.
-        worst_fusion_discarded: most weight that the fusion truncated.
-        sensors: their names.
-    """
-
-    num_scans: int
-    limit_reached: float
-    search_truncated: float
-    inexact: float
-    mean_discarded: float
-    worst_discarded: float
-    mean_factoring: float
-    worst_factoring: float
-    worst_dropped: float
-    duplicates: int
-    clutter_raised: int
-    missing_sets: Floats
-    unknown_labels: Floats
-    lost: float
-    worst_lost: int
-    disjoint: float
-    worst_fusion_discarded: float
-    sensors: tuple[str, ...]
-
-
-def summarise_health(sums: HealthSums, sensors: Sequence[str] = ()) -> HealthSummary:
-    """Return the summary of runs. sensors: their names, by default `sensor 1` and so on."""
-
-    def mean(total: float, number: int) -> float:
-        return total / number if number else np.nan
-
-    num_scans, num_known, num_factored = sums.num_scans, sums.num_discarded, sums.num_factoring
-    return HealthSummary(
-        num_scans=num_scans,
-        limit_reached=sums.limit_reached / num_scans,
-        search_truncated=sums.search_truncated / num_scans,
-        inexact=sums.inexact / num_scans,
-        mean_discarded=mean(sums.discarded, num_known),
-        worst_discarded=sums.worst_discarded if num_known else np.nan,
-        mean_factoring=mean(sums.factoring, num_factored),
-        worst_factoring=sums.worst_factoring if num_factored else np.nan,
-        worst_dropped=sums.worst_dropped,
-        duplicates=sums.duplicates,
-        clutter_raised=sums.clutter_raised,
-        missing_sets=sums.num_missing_sets / max(1, sums.num_sets),
-        unknown_labels=sums.unknown_labels / num_scans,
-        lost=sums.lost / num_scans,
-        worst_lost=int(sums.worst_lost),
-        disjoint=sums.disjoint / num_scans,
-        worst_fusion_discarded=sums.worst_fusion_discarded,
-        sensors=tuple(sensors) or tuple(f"sensor {number + 1}" for number in range(len(sums.unknown_labels))),
+        **{
+            name: np.fmax.reduce(values) if name.startswith("worst_") else sum(values)
+            for name, values in columns.items()
+        }
     )
 
 

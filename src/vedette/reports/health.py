@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from vedette.evaluation.diagnostics import Diagnostic, birth_diagnostics, diagnostics
-from vedette.evaluation.health import percent, summarise_health
+from vedette.evaluation.health import percent
 from vedette.reports.groups import Group, Strategy
 from vedette.reports.tables import nees_over_runs, nees_spread
 
@@ -42,7 +42,7 @@ def strategy_diagnostics(strategy: Strategy) -> Iterator[Diagnostic]:
     yield _missed(strategy)
     yield _consistency(strategy)
     yield _worst_estimate(strategy)
-    yield from diagnostics(summarise_health(strategy.ensemble.health, strategy.scene.names))
+    yield from diagnostics(strategy.ensemble.health, strategy.scene.names)
     yield from birth_diagnostics(strategy.record(int(strategy.ensemble.runs[0])), strategy.cell.scenario)
 
 

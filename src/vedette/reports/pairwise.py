@@ -91,21 +91,14 @@ def _verdict(paired: PairedDifference, p_value: float) -> Verdict:
     return "better" if float(paired.summary.mean) > 0.0 else "worse"
 
 
-def _better(first: str, second: str, paired: PairedDifference, unit: str) -> str:
-    less = with_unit(f"{float(paired.summary.mean):.2f}", unit)
-    interval = _range(float(paired.summary.low), float(paired.summary.high), unit)
+def _significant(first: str, second: str, paired: PairedDifference, unit: str) -> str:
+    ends = float(paired.summary.low), float(paired.summary.high)
+    is_smaller = float(paired.summary.mean) > 0.0
+    interval = _range(*ends, unit) if is_smaller else _range(-ends[1], -ends[0], unit)
+    size = with_unit(f"{abs(float(paired.summary.mean)):.2f}", unit)
     return (
-        f"{first} has a smaller mean OSPA than {second}, by {less} (95 % interval {interval}, {_runs(paired)}). "
-        f"It is smaller in {_share(paired)}."
-    )
-
-
-def _worse(first: str, second: str, paired: PairedDifference, unit: str) -> str:
-    more = with_unit(f"{-float(paired.summary.mean):.2f}", unit)
-    interval = _range(-float(paired.summary.high), -float(paired.summary.low), unit)
-    return (
-        f"{first} has a larger mean OSPA than {second}, by {more} (95 % interval {interval}, {_runs(paired)}). "
-        f"It is smaller in only {_share(paired)}."
+        f"{first} has a {'smaller' if is_smaller else 'larger'} mean OSPA than {second}, by {size} (95 % interval "
+        f"{interval}, {_runs(paired)}). It is smaller in {'' if is_smaller else 'only '}{_share(paired)}."
     )
 
 
@@ -123,7 +116,7 @@ def _unknown(first: str, second: str, paired: PairedDifference, unit: str) -> st
     return f"One run proves nothing. {second} minus {first}: {difference} in mean OSPA."
 
 
-_SENTENCES = {"better": _better, "worse": _worse, "unclear": _unclear, "unknown": _unknown}
+_SENTENCES = {"better": _significant, "worse": _significant, "unclear": _unclear, "unknown": _unknown}
 
 
 def _range(low: float, high: float, unit: str) -> str:

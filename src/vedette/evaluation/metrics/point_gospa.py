@@ -7,7 +7,7 @@ A. S. Rahmathullah, A. F. Garcia-Fernandez and L. Svensson, "Generalized optimal
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -84,14 +84,7 @@ def gospa(estimates: ArrayLike, truths: ArrayLike, *, cutoff: float, order: floa
     matched = matched[matched < cutoff]
     missed, false = (np.array([len(points) - len(matched)]) for points in (second, first))
     series = _series(np.zeros(len(matched), np.int64), matched, missed, false, cutoff, order)
-    return GospaResult(
-        total=float(series.total[0]),
-        localisation=float(series.localisation[0]),
-        missed=float(series.missed[0]),
-        false=float(series.false[0]),
-        num_missed=int(missed[0]),
-        num_false=int(false[0]),
-    )
+    return GospaResult(*(getattr(series, each.name)[0].item() for each in fields(series)))
 
 
 def gospa_distance(
