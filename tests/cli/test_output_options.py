@@ -231,21 +231,10 @@ def test_shell_completion_lists_names(place: Path, words: tuple[str, ...], expec
     assert done.stdout.split() == expected
 
 
-@pytest.mark.parametrize(
-    ("words", "option"),
-    [
-        (("run", "paper-a", "--trust"), "--allow-code"),
-        (("video", "run", "--out", "a.gif", "--speed", "2"), "--time-scale"),
-        (("track", "scans.csv", "--sensors", "radars.yaml", "--speed", "2"), "--max-target-speed"),
-        (("show", "paper-a", "--resolved"), "--with-defaults"),
-        (("run", "paper-a", "--plannr", "jdm"), "--planner"),
-    ],
-    ids=lambda each: " ".join(each) if isinstance(each, tuple) else each,
-)
-def test_an_unknown_option_suggests_the_present_one(words: tuple[str, ...], option: str) -> None:
-    result = call(*words)
+def test_a_misspelled_option_suggests_the_right_one() -> None:
+    result = call("run", "paper-a", "--plannr", "jdm")
     assert result.exit_code == 2
-    assert option in result.stderr
+    assert "--planner" in result.stderr
 
 
 def test_missing_shards_are_listed_with_the_commands_that_run_them(place: Path) -> None:

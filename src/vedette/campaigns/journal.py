@@ -67,19 +67,11 @@ class Writer:
                         raise InputError(f"{self._path}: {place}expected another run; it is there") from None
                     self._database.execute("DELETE FROM failures WHERE cell = ? AND run = ?", (row.cell, row.run))
 
-    def put_failure(self, failure: database.Failure) -> None:
-        """Store why a run could not be finished, replacing an earlier reason, until it is finished."""
-        self._change(
-            failure.cell,
-            failure.run,
-            "INSERT OR REPLACE INTO failures (session, message, cell, run) VALUES (?, ?, ?, ?)",
-            failure.session,
-            failure.message,
-        )
-
     def finished(self) -> set[tuple[str, int]]:
         """Return cell and number of every run in the file."""
-        return set(self._keys())
+        with database.translated_errors(self._path):
+            rows = self._database.execute("SELECT cell, run FROM runs ORDER BY cell, run").fetchall()
+        return set(database.checked_keys(self._path, rows))
 
     def damaged(self) -> tuple[tuple[str, int], ...]:
         """Return cell and number of every run whose row has changed since it was written."""
@@ -132,11 +124,6 @@ class Writer:
     def discard(self, cell: str, run: int) -> None:
         """Delete a run from the file."""
         self._change(cell, run, "DELETE FROM runs WHERE cell = ? AND run = ?")
-
-    def _keys(self) -> list[tuple[str, int]]:
-        with database.translated_errors(self._path):
-            rows = self._database.execute("SELECT cell, run FROM runs ORDER BY cell, run").fetchall()
-        return database.checked_keys(self._path, rows)
 
     def _change(self, cell: str, run: int, statement: str, *values: Any) -> None:
         """Execute a statement about one run, whose key follows the values."""

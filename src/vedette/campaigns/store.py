@@ -12,7 +12,7 @@ from types import TracebackType
 from typing import Any
 
 from vedette.campaigns.cells import Campaign
-from vedette.campaigns.database import DATABASE, LOCK, Failure
+from vedette.campaigns.database import DATABASE, LOCK
 from vedette.campaigns.journal import Writer
 from vedette.campaigns.manifest import (
     MANIFEST,
@@ -98,8 +98,9 @@ class Store(Writer):
         return tuple((cell, run) for cell, run, kept in self.metrics() if not has_metrics(kept, names.get(cell, ())))
 
     def note_failure(self, cell: str, run: int, message: str) -> None:
-        """Store why a run could not be finished, until it is finished."""
-        self.put_failure(Failure(cell, int(run), self.session, message))
+        """Store why a run could not be finished, replacing an earlier reason, until it is finished."""
+        statement = "INSERT OR REPLACE INTO failures (session, message, cell, run) VALUES (?, ?, ?, ?)"
+        self._change(cell, int(run), statement, self.session, message)
 
     def _begin_session(self, fresh: dict[str, Any]) -> dict[str, Any]:
         """Add a session to the folder's manifest, open its runs, and return the manifest."""

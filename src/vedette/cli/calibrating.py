@@ -22,7 +22,7 @@ from vedette.cli.scenario_files import write_text
 from vedette.errors import InputError
 
 if TYPE_CHECKING:
-    from vedette.calibration import CalibrationWindow
+    from vedette.calibration import CalibrationWindow, Parameter, Problem
     from vedette.evaluation.fit import Fit
     from vedette.scenarios.from_recording import RecordingScenario
 
@@ -140,11 +140,10 @@ def calibrate_doubtful(recorded: RecordingScenario, fit: Fit, sensors: Path) -> 
     Returns the sensors file with better values, and the calibration as data, or None if there is nothing to estimate.
     """
     from vedette.calibration import CalibrationWindow, calibrate
-    from vedette.evaluation.doubtful_parameters import doubtful_parameters
     from vedette.scenarios.calibration import build_problem, calibrated_text
 
     problem = build_problem(recorded.scenario, biases=_has_several_sensors(recorded))
-    doubtful = doubtful_parameters(problem, recorded, fit)
+    doubtful = _doubtful_parameters(problem, recorded, fit)
     if not doubtful:
         note("--calibrate: the sensors file gives all values, and the fit names none of them")
         return None
@@ -154,6 +153,19 @@ def calibrate_doubtful(recorded: RecordingScenario, fit: Fit, sensors: Path) -> 
     print_windows([CalibrationWindow(0.0, math.inf, found)], names, position=False)
     text = calibrated_text(recorded.scenario, sensors, found, None)
     return text, calibration_document(found, names)
+
+
+def _doubtful_parameters(problem: Problem, recorded: RecordingScenario, fit: Fit) -> list[Parameter]:
+    """Return the parameters that are assumed, and those that findings of fit name. Biases of 0 count as not given."""
+    tests, names = {(each.sensor, each.test) for each in fit.findings}, recorded.scenario.model.sensor_names
+
+    def is_doubtful(each: Parameter) -> bool:
+        if each.kind == "bias" and (each.start == 0.0 or ("", "agreement") in tests):
+            return True
+        is_assumed = each.kind == "clutter" and "clutter" in recorded.assumed
+        return is_assumed or (names[each.sensor], each.kind) in tests
+
+    return [each for each in problem.parameters if is_doubtful(each)]
 
 
 @contextmanager

@@ -19,23 +19,6 @@ from vedette.errors import InputError, VedetteError
 from vedette.internal.text import shown
 
 INTERRUPTED = 130
-_UsageError: Any = typer.BadParameter.__base__  # the parent of the error about an unknown option, too
-# Former options, by command or for all; the error about one suggests the present one.
-_FORMER_OPTIONS: dict[tuple[str | None, str], str] = {
-    ("video", "--speed"): "--time-scale",
-    ("video", "--seconds"): "--duration",
-    ("benchmark", "--seconds"): "--timeout",
-    ("calibrate", "--position"): "--sensor-positions",
-    ("crowd", "--measured"): "--measurement",
-    ("generate", "--view"): "--field-of-view",
-    ("show", "--resolved"): "--with-defaults",
-    (None, "--speed"): "--max-target-speed",
-    (None, "--trust"): "--allow-code",
-    ("live", "--window"): "--max-delay",
-    ("live", "--ahead"): "--max-lead",
-    ("live", "--every"): "--snapshot-interval",
-    ("live", "--plan-within"): "--planning-timeout",
-}
 
 
 class CommandGroup(TyperGroup):
@@ -65,12 +48,6 @@ class CommandGroup(TyperGroup):
             return result
         except typer.BadParameter as error:
             error.message = _message_with_value(error)
-            raise
-        except _UsageError as error:
-            option = getattr(error, "option_name", "")
-            names = [_FORMER_OPTIONS.get((command, option)) for command in (error.ctx and error.ctx.info_name, None)]
-            if name := names[0] or names[1]:
-                error.possibilities = [name]
             raise
         except VedetteError as error:
             echo_error(str(error))

@@ -20,39 +20,28 @@ from vedette.internal.extras import require_packages
 from vedette.internal.files import write_file
 from vedette.internal.text import spreadsheet_text
 from vedette.kernels.base.types import VY
-from vedette.platforms.compass import Compass, courses_of
-from vedette.recorded import Origin
+from vedette.platforms.compass import courses_of
 from vedette.scenarios import Scenario
 from vedette.simulation.records import RunRecord
 
 
-def track_table(
-    record: RunRecord,
-    *,
-    cutoff: float,
-    origin: Origin | None = None,
-    start: float = 0.0,
-    is_utc: bool = False,
-    names: Sequence[str] = (),
-    compass: Compass | None = None,
-    joins: Sequence[Join] = (),
-    components: Sequence[str] = (),
-    classes: Sequence[str] = (),
-) -> dict[str, list[Any]]:
-    """Return the estimates by columns, one row for each.
+def table_of_run(record: RunRecord, scenario: Scenario, joins: Sequence[Join] = ()) -> dict[str, list[Any]]:
+    """Return the estimates of a run by columns, one row for each.
 
-    `time_s` is that of the record plus `start`; `utc` if that is since 1970. `label` is `birth step.index`. `track` is
-    the first label of its track, different from `label` after a gap that `joins` close. `x_m`, `y_m`, `vx_mps`,
-    `vy_mps` are the estimate, `std_...` its standard deviations (velocities only if the state has them: four components
-    or more, with `components` also `z_m`, `vz_mps`), `existence` is the existence probability. `lon_deg`, `lat_deg`
-    need an origin. `course_deg`, clockwise from true north, and `speed_mps` need a compass. `target` is the name of the
-    true target that OSPA's assignment gives it, nearer than `cutoff` (m), or None.
+    `time_s` is in the clock of the recording, if any, and `utc` if that counts from 1970. `label` is `birth
+    step.index`. `track` is the first label of its track, different from `label` after a gap that `joins` close. `x_m`,
+    `y_m`, `vx_mps`, `vy_mps` are the estimate, `std_...` its standard deviations (velocities only if the state has
+    them: four components or more, with heights also `z_m`, `vz_mps`), `existence` is the existence probability.
+    `lon_deg`, `lat_deg` need an origin. `course_deg`, clockwise from true north, and `speed_mps` need a compass.
+    `target` is the name (by default `id + 1`) of the true target that OSPA's assignment gives it, nearer than the
+    cutoff of OSPA, or None. With classes of targets, `class` is the most probable one and `prob_...` the probability of
+    each.
 
-    With `classes`, their names, `class` is the most probable one and `prob_...` the probability of each.
-
-    names: of the true targets, by their ids, else `id + 1`. joins: see `evaluation.joining`. components: of the motion.
+    joins: see `vedette.evaluation.joining`.
     """
-    matching = match_run(record.truth, record.estimates, cutoff=cutoff, order=1.0)
+    model = scenario.model
+    start, is_utc, names = recording_metadata(record, scenario)
+    matching = match_run(record.truth, record.estimates, cutoff=model.ospa.cutoff, order=1.0)
     matched_targets = dict(
         zip(
             zip(matching.scans.tolist(), map(tuple, matching.labels.tolist()), strict=True),
@@ -76,39 +65,21 @@ def track_table(
     table["track"] = [_label(tracks.get(label, label)) for _, label, *_ in rows]
     dim = len(rows[0][2]) if rows else 4
     means, covs = (np.array([row[part] for row in rows]) for part in (2, 3))
-    table |= state_columns(means.reshape(-1, dim), covs.reshape(-1, dim, dim), components)
-    if origin is not None:
-        positions = origin.to_degrees(np.array([row[2][:2] for row in rows]).reshape(-1, 2))
+    table |= state_columns(means.reshape(-1, dim), covs.reshape(-1, dim, dim), model.motion.components)
+    if model.origin is not None:
+        positions = model.origin.build().to_degrees(np.array([row[2][:2] for row in rows]).reshape(-1, 2))
         table["lon_deg"], table["lat_deg"] = positions[:, 0].tolist(), positions[:, 1].tolist()
-    if compass is not None and dim > VY:
-        courses = courses_of(compass, means.reshape(-1, dim))
+    if model.by_compass and dim > VY:
+        courses = courses_of(model.north(), means.reshape(-1, dim))
         table["course_deg"], table["speed_mps"] = courses[:, 0].tolist(), courses[:, 1].tolist()
     table["existence"] = [row[4] for row in rows]
-    if classes:
+    if model.classes:
+        classes = tuple(model.classes)
         probs = np.concatenate([estimate.class_probs for estimate in record.estimates])
         table["class"] = [classes[k] for k in probs.argmax(axis=1).tolist()]
         table |= {f"prob_{name}": probs[:, k].tolist() for k, name in enumerate(classes)}
     table["target"] = [_name(matched_targets.get((row[0], row[1])), names) for row in rows]
     return table
-
-
-def table_of_run(record: RunRecord, scenario: Scenario, joins: Sequence[Join] = ()) -> dict[str, list[Any]]:
-    """Return the `track_table` of a run, with origin, times and names of targets from its scenario."""
-    model = scenario.model
-    origin = None if model.origin is None else model.origin.build()
-    start, is_utc, names = recording_metadata(record, scenario)
-    return track_table(
-        record,
-        cutoff=model.ospa.cutoff,
-        origin=origin,
-        start=start,
-        is_utc=is_utc,
-        names=names,
-        compass=model.north() if model.by_compass else None,
-        joins=joins,
-        components=model.motion.components,
-        classes=tuple(model.classes),
-    )
 
 
 def write_tracks(path: Path, table: Mapping[str, Sequence[Any]]) -> None:
