@@ -21,13 +21,14 @@ class HealthSums(NamedTuple):
         num_scans: of all runs.
         limit_reached, search_truncated, inexact: scans at which a filter reached a limit, its ranking search was cut
             short, an LMB cluster was not summed exactly.
-        discarded, num_discarded, worst_discarded: upper bound on the share of a filter's weight that was truncated, sum
-            over scans and sensors with a known value, and their number.
+        discarded, num_discarded, worst_discarded: upper bound on the share of a filter's weight that was truncated: sum
+            over scans and sensors with a known value, their number, and the largest value.
         factoring, num_factoring, worst_factoring: the same of the L1 error of a factored filter from treating labels as
             independent.
         worst_dropped: expected number of targets in labels that a filter dropped at one scan.
         duplicates, clutter_raised: numbers of measurements.
-        num_missing_sets: (num_sensors,) fused label sets (CLMB: labels) that the sensor lacks, of `num_sets`.
+        num_missing_sets: (num_sensors,) fused label sets (CLMB: labels) that the sensor lacks.
+        num_sets: number of fused label sets.
         unknown_labels: (num_sensors,) scans at which the sensor lacks a label that another one has.
         lost: scans at which the fusion lost a label that a sensor was sure of.
         worst_lost: most such labels at a scan.
