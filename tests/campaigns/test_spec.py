@@ -115,7 +115,7 @@ def test_the_digest_covers_the_files_that_a_scenario_names(tmp_path: Path) -> No
     (tmp_path / "scene.yaml").write_text(resolve_text("paper-a"))
     model = "from vedette.models import constant_velocity\n\n\ndef motion():\n    return constant_velocity({})\n"
     (tmp_path / "own.py").write_text(model.format(5.0))
-    own = 'set.motion = {kind = "custom", function = "own.py:motion", state_dim = 4}'
+    own = 'set.motion = {kind = "custom", function = "own.py:motion", components = ["px", "py", "vx", "vy"]}'
     spec = parse_spec(f'name = "x"\nscenarios = ["scene.yaml"]\nruns = 1\nplanners = ["stationary"]\n{own}')
     before = resolve(spec, tmp_path).digest()
     (tmp_path / "own.py").write_text(model.format(6.0))
