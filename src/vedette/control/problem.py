@@ -9,7 +9,7 @@ from functools import cache
 
 import numpy as np
 
-from vedette.control.additive.rewards import AdditiveRewards
+from vedette.control.additive.rewards import AdditiveRewards, value_found
 from vedette.control.constraints import Mask
 from vedette.control.evaluator import Evaluator
 from vedette.control.evidence import Evidence
@@ -218,7 +218,7 @@ def _most_found(additive: AdditiveRewards) -> float:
         entries = slice(cells.offsets[first], cells.offsets[last])
         np.minimum.at(least, cells.cells[entries], cells.log_miss[entries])
         totals += least
-    return float(-(cells.worth * np.expm1(totals)).sum())  # A dot product would depend on threads.
+    return value_found(cells.worth, totals)
 
 
 def beyond_cutoff(evaluator: Evaluator, choice: Sequence[int]) -> Iterator[str]:

@@ -170,11 +170,9 @@ def _truncation(health: HealthSums) -> str:
         weight = f"weight {_bound(health.worst_discarded)} (mean {_bound(health.discarded / health.num_discarded)})"
     else:
         weight = "weight 0 %"
-    return (
-        f"{weight}, limit reached at {_scans(health.limit_reached / health.num_scans)}"
-        if health.limit_reached
-        else weight
-    )
+    if not health.limit_reached:
+        return weight
+    return f"{weight}, limit reached at {_scans(health.limit_reached / health.num_scans)}"
 
 
 def _truncation_level(health: HealthSums) -> Level:

@@ -50,15 +50,15 @@ def check_scan(scan: Any, sensor: SensorModel, num_classes: int) -> tuple[Measur
     expected = f"an array of shape (num_measurements, {meas_dim}), empty for a scan without measurements"
     if scan is None:
         raise InputError(f"scan: expected {expected}; got None")
-    brings_noise = isinstance(scan, ScanRows)
-    given = scan.values if brings_noise else scan
+    is_bundle = isinstance(scan, ScanRows)
+    given = scan.values if is_bundle else scan
     if type(given) is not np.ndarray or given.dtype != np.float64:
         given = as_array("scan", given, "fiu", f"numbers in {expected}")
     if given.size == 0 and given.ndim <= 2:
         return to_measurements(np.empty((0, meas_dim))), _NO_ROWS
     if given.ndim != 2 or given.shape[1] != meas_dim:
         raise InputError(f"scan: expected {expected}; got shape {given.shape}")
-    if brings_noise and scan.class_ratios.shape[1] not in (0, num_classes):
+    if is_bundle and scan.class_ratios.shape[1] not in (0, num_classes):
         ratios = f"class ratios of {num_classes} classes, as the targets have"
         raise InputError(f"scan: expected {ratios}; got those of {scan.class_ratios.shape[1]}")
     array = np.array(given, dtype=np.float64, order="C")
@@ -69,7 +69,7 @@ def check_scan(scan: Any, sensor: SensorModel, num_classes: int) -> tuple[Measur
         _warn_negative(array, measurement, sensor.noise.least_stds)
     if largest > _WITHIN:  # rare
         array, may_repeat = _wrapped(array, measurement), True
-    rows = with_values(scan, array) if brings_noise else array
+    rows = with_values(scan, array) if is_bundle else array
     if not may_repeat:  # most scans
         return to_measurements(rows), _NO_ROWS
     first = np.sort(np.unique(table_of(rows), axis=0, return_index=True)[1])

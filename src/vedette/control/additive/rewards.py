@@ -183,7 +183,15 @@ class AdditiveRewards:
             course = self.table.first_courses[s] + chosen[s]
             entries = slice(cells.offsets[course], cells.offsets[course + 1])
             totals[cells.cells[entries]] += cells.log_miss[entries]
-        return float(-(cells.worth * np.expm1(totals)).sum())  # A dot product would depend on threads.
+        return value_found(cells.worth, totals)
+
+
+def value_found(worth: Floats, log_miss: Floats) -> float:
+    """Return the value of the undetected targets found in cells (num_cells,). log_miss: log probability of missing one.
+
+    A dot product would depend on the number of threads.
+    """
+    return float(-(worth * np.expm1(log_miss)).sum())
 
 
 def valuation_of(reward: Any, prediction: LMB, prior: Floats, undetected: float = 0.0) -> Valuation:
