@@ -297,7 +297,7 @@ def test_the_command_exports(whole, tmp_path):
     ("arguments", "status", "message"),
     [
         (("nowhere",), 1, "no such folder"),
-        ((".", "--format", "excel"), 2, "parquet, csv, netcdf"),
+        ((".", "--format", "excel"), 2, "expected one of 'parquet', 'csv', 'netcdf'; got 'excel'"),
         ((".", "--format", "csv"), 2, "--export"),
     ],
 )

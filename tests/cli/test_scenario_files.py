@@ -109,8 +109,8 @@ def test_generate_names_the_file_after_the_scene(tmp_path: Path, monkeypatch: py
 @pytest.mark.parametrize(
     ("words", "status", "message"),
     [
-        (("--pattern", "swarm"), 2, "expected one of spread, crowd; got swarm"),
-        (("--field-of-view", "none"), 2, "expected one of full, limited; got none"),
+        (("--pattern", "swarm"), 2, "expected one of 'spread', 'crowd'; got 'swarm'"),
+        (("--field-of-view", "none"), 2, "expected one of 'limited', 'full'; got 'none'"),
         (("--sensors", "0"), 2, "Invalid value for '--sensors'"),
     ],
 )
@@ -139,7 +139,7 @@ def test_crowd_writes_a_commented_file_that_passes_check(tmp_path: Path, monkeyp
 @pytest.mark.parametrize(
     ("words", "message"),
     [
-        (("--measurement", "range"), "expected one of position, bearing_range; got range"),
+        (("--measurement", "range"), "expected one of 'position', 'bearing_range'; got 'range'"),
         (("--targets", "0"), "Invalid value for '--targets'"),
         (("--density", "0"), "Invalid value for '--density'"),
     ],

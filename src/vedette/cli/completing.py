@@ -5,13 +5,12 @@ A scenario is read only to complete its own strategies. Completion never raises 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from pathlib import Path
 
 import typer
 
 _PACKAGE = Path(__file__).parents[1]
-Completion = Callable[[str], list[str]]
 
 
 def scenarios(incomplete: str) -> list[str]:
@@ -45,11 +44,6 @@ def lists_of_strategies(context: typer.Context, incomplete: str) -> list[str]:
     chosen = before.split(",")
     names = (name for name in _strategies(_first_argument(context)) if name not in chosen)
     return [f"{before}{comma}{name}" for name in _matching(last, names)]
-
-
-def one_of(*names: str) -> Completion:
-    """Return a function that completes these names."""
-    return lambda incomplete: _matching(incomplete, names)
 
 
 def _first_argument(context: typer.Context) -> str | None:

@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+import re
 import sys
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
@@ -69,7 +70,8 @@ def _message_with_value(error: typer.BadParameter) -> str:
     if pydantic_errors is None:
         return error.message
     first = pydantic_errors()[0]
-    return f"{first['msg'].replace('Input should be', 'expected', 1)}; got {shown(first['input'])}"
+    expected = re.sub("^(Input should be|Value error, .* is not)(?= )", "expected", first["msg"]).rstrip(".")
+    return f"{expected}; got {shown(first['input'])}"
 
 
 def usage_error(message: str, option: str) -> typer.BadParameter:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Literal
 
 import typer
 
@@ -30,7 +30,6 @@ Workers = Annotated[
 Trust = Annotated[
     bool, typer.Option("--allow-code", help="Run Python code named in a scenario that other users can modify.")
 ]
-BAD_ROWS = ("refuse", "skip")
 ScansFile = Annotated[Path, typer.Argument(metavar="SCANS", help="CSV or Parquet file with one row per measurement.")]
 SensorsFile = Annotated[
     Path,
@@ -46,11 +45,6 @@ Speed = Annotated[
     ),
 ]
 BadRows = Annotated[
-    str,
-    typer.Option(
-        "--bad-rows",
-        metavar="NAME",
-        help="Rows that cannot be read: refuse or skip.",
-        autocompletion=completing.one_of(*BAD_ROWS),
-    ),
+    Literal["refuse", "skip"],
+    typer.Option("--bad-rows", metavar="NAME", help="Rows that cannot be read: refuse or skip."),
 ]

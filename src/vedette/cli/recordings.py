@@ -5,8 +5,6 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from vedette.cli.errors import usage_error
-from vedette.cli.options import BAD_ROWS
 from vedette.cli.output import note
 from vedette.cli.running import CodeTrust
 from vedette.cli.scenario_files import note_assumptions, print_warnings
@@ -23,8 +21,6 @@ def read_recording(
     """Return the scenario of recorded scans and its warnings. Print skipped rows, assumptions and code that runs."""
     from vedette.scenarios.from_recording import scenario_from_recording
 
-    if bad_rows not in BAD_ROWS:
-        raise usage_error(f"expected one of {', '.join(BAD_ROWS)}; got {bad_rows!r}", "--bad-rows")
     recorded = scenario_from_recording(sensors, scans, truth, speed=speed, bad_rows=bad_rows)
     CodeTrust(trust)(recorded.scenario)
     warnings = print_warnings(recorded.scenario)

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from vedette.cli.comparisons import print_comparison
-from vedette.cli.completing import one_of
 from vedette.cli.documents import results_document, run_document
 from vedette.cli.errors import check_ending, usage_error
 from vedette.cli.options import ResultsFolder
@@ -27,18 +27,13 @@ if TYPE_CHECKING:
     from vedette.simulation.records import RunRecord
 
 _MAX_SHOWN_FAILURES = 10
-_FORMATS = ("parquet", "csv", "netcdf")
+Format = StrEnum("Format", ["parquet", "csv", "netcdf"])
 Export = Annotated[
     Path | None, typer.Option("--export", metavar="DIR", help="Folder for the results as files of other tools.")
 ]
 Formats = Annotated[
-    list[str] | None,
-    typer.Option(
-        "--format",
-        metavar="NAME",
-        help="Of the files: parquet (default), csv, netcdf; may be repeated.",
-        autocompletion=one_of(*_FORMATS),
-    ),
+    list[Format] | None,
+    typer.Option("--format", metavar="NAME", help="Of the files: parquet (default), csv, netcdf; may be repeated."),
 ]
 TexFile = Annotated[
     Path | None, typer.Option("--tex", metavar="FILE", help="Write the comparisons as LaTeX tables (booktabs).")
@@ -62,9 +57,6 @@ def results(folder: ResultsFolder, export: Export = None, formats: Formats = Non
 
 
 def _check_options(export: Path | None, formats: Sequence[str], tex: Path | None) -> None:
-    for name in formats:
-        if name not in _FORMATS:
-            raise usage_error(f"expected one of {', '.join(_FORMATS)}; got {name}", "--format")
     if formats and export is None:
         raise usage_error("expected with --export, which names the folder", "--format")
     check_ending(tex, "--tex", "tex")

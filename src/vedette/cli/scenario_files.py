@@ -8,11 +8,11 @@ import shutil
 import textwrap
 from collections.abc import Iterable, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
-from vedette.cli.completing import built_in_scenarios, one_of
+from vedette.cli.completing import built_in_scenarios
 from vedette.cli.errors import check_ending, usage_error
 from vedette.cli.options import Overwrite, SceneFile
 from vedette.cli.output import echo, emit_json, note, print_json, print_names
@@ -59,22 +59,12 @@ def init(
 
 
 Pattern = Annotated[
-    str,
-    typer.Option(
-        "--pattern",
-        metavar="NAME",
-        help="spread: groups of targets separate; crowd: they meet.",
-        autocompletion=one_of("spread", "crowd"),
-    ),
+    Literal["spread", "crowd"],
+    typer.Option("--pattern", metavar="NAME", help="spread: groups of targets separate; crowd: they meet."),
 ]
 FieldOfView = Annotated[
-    str,
-    typer.Option(
-        "--field-of-view",
-        metavar="NAME",
-        help="limited: sensors see 250 m; full: they see everything.",
-        autocompletion=one_of("limited", "full"),
-    ),
+    Literal["limited", "full"],
+    typer.Option("--field-of-view", metavar="NAME", help="limited: sensors see 250 m; full: they see everything."),
 ]
 
 
@@ -97,11 +87,8 @@ def generate(
 
     The region has 500 m x 500 m per sensor, so that scenes with few and with many sensors compare.
     """
-    from vedette.scenarios.generated import PATTERNS, VIEWS, GeneratedScene, scene_text
+    from vedette.scenarios.generated import GeneratedScene, scene_text
 
-    for name, value, known in (("--pattern", pattern, PATTERNS), ("--field-of-view", view, VIEWS)):
-        if value not in known:
-            raise usage_error(f"expected one of {', '.join(known)}; got {value}", name)
     scene = GeneratedScene(
         num_sensors=sensors, pattern=pattern, view=view, num_targets=targets, decide_every=decide_every, seed=seed
     )
@@ -121,13 +108,8 @@ def crowd(
         typer.Option("--clutter", metavar="N", min=0.0, max=100.0, help="False measurements per target and scan."),
     ] = 0.3,
     measured: Annotated[
-        str,
-        typer.Option(
-            "--measurement",
-            metavar="NAME",
-            help="position, or bearing_range from outside the square.",
-            autocompletion=one_of("position", "bearing_range"),
-        ),
+        Literal["position", "bearing_range"],
+        typer.Option("--measurement", metavar="NAME", help="position, or bearing_range from outside the square."),
     ] = "position",
     steps: Annotated[int, typer.Option("--steps", metavar="N", min=1, max=10_000, help="Number of scans.")] = 40,
     overwrite: Overwrite = False,
@@ -136,10 +118,8 @@ def crowd(
 
     The area of the region grows with the number of targets, so that small and large crowds compare.
     """
-    from vedette.scenarios.generated_crowd import MEASURED, GeneratedCrowd, crowd_text
+    from vedette.scenarios.generated_crowd import GeneratedCrowd, crowd_text
 
-    if measured not in MEASURED:
-        raise usage_error(f"expected one of {', '.join(MEASURED)}; got {measured}", "--measurement")
     scene = GeneratedCrowd(num_targets=targets, density=density, clutter=clutter, measured=measured, num_steps=steps)
     _write_generated(path, scene.name, crowd_text(scene), overwrite)
 

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from vedette.cli.compiling import compiling
-from vedette.cli.completing import one_of
 from vedette.cli.documents import run_document
 from vedette.cli.errors import usage_error
 from vedette.cli.options import BadRows, Overwrite, ScansFile, SensorsFile, Speed, Trust
@@ -36,7 +36,7 @@ if TYPE_CHECKING:
     from vedette.scenarios.from_recording import RecordingScenario
     from vedette.simulation.records import RunRecord
 
-FORMATS = ("csv", "geojson", "parquet", "czml", "mcap")
+Format = StrEnum("Format", ["csv", "geojson", "parquet", "czml", "mcap"])
 ON_EARTH = ("geojson", "czml", "mcap")
 _MIN_ESTIMATES = 10  # smallest number of estimates of a lasting track
 
@@ -49,12 +49,11 @@ Out = Annotated[
     typer.Option("--out", metavar="DIR", help="Folder for results, tracks and figures; default: print only."),
 ]
 Formats = Annotated[
-    list[str] | None,
+    list[Format] | None,
     typer.Option(
         "--format",
         metavar="NAME",
         help="Of the tracks: csv and geojson (default), parquet, czml, mcap. May be repeated.",
-        autocompletion=one_of(*FORMATS),
     ),
 ]
 JoinTracks = Annotated[
@@ -152,8 +151,6 @@ def _check_output(formats: Sequence[str], out: Path | None, overwrite: bool) -> 
     from vedette.evaluation.track_table import check_format
 
     for name in formats:
-        if name not in FORMATS:
-            raise usage_error(f"expected one of {', '.join(FORMATS)}; got {name}", "--format")
         check_format(Path(f"tracks.{name}"))
     if formats and out is None:
         raise usage_error("expected with --out, which names the folder", "--format")
