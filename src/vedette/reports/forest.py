@@ -10,11 +10,9 @@ from matplotlib.ticker import MaxNLocator
 from vedette.evaluation.tables import heading, significance
 from vedette.internal.text import named_in, with_error, with_minus
 from vedette.reports.groups import Group
-from vedette.reports.pairwise import compare_with_first
+from vedette.reports.pairwise import PairwiseComparison, compare_with_first
 
 _ROOM = 0.06  # share of the axis that is left free at each side
-# Verdicts state the first strategy against another; the page shows that of the other.
-_WORDS = {"better": "larger error", "worse": "smaller error", "unclear": "not significant", "unknown": "one run"}
 
 
 @dataclass(frozen=True, slots=True)
@@ -23,27 +21,19 @@ class ForestRow:
 
     Attributes:
         name, words: name and description of the strategy.
-        colour: index of the strategy, which determines its colour.
         error: mean OSPA with its standard error.
+        pair: comparison of the first strategy with this one, None for the first itself.
         mean, low, high: positions of the difference and of the ends of its interval on the axis, in percent of the
             width, or None for the first strategy, and for the interval of one run.
-        difference: the same as text.
-        verdict: class of the verdict on the difference, `reference` for the first strategy.
-        verdict_words: the verdict in words.
-        sentence: the finding.
     """
 
     name: str
     words: str
-    colour: int
     error: str
+    pair: PairwiseComparison | None
     mean: float | None = None
     low: float | None = None
     high: float | None = None
-    difference: str = ""
-    verdict: str = "reference"
-    verdict_words: str = "reference"
-    sentence: str = ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -84,28 +74,15 @@ def forest_of(group: Group) -> Forest | None:
 
     errors = [comparison.summary(name) for name in comparison.strategies]
     texts = [with_error(float(each.mean), float(each.standard_error)) for each in errors]
-    strategies = group.strategies
-    rows = [ForestRow(strategies[0].name, strategies[0].words, 0, texts[0])]
-    for index, each in enumerate(comparisons, start=1):
-        rows.append(
-            ForestRow(
-                each.second,
-                strategies[index].words,
-                index,
-                texts[index],
-                place(each.mean),
-                place(each.low),
-                place(each.high),
-                each.difference,
-                each.verdict,
-                _WORDS[each.verdict],
-                each.sentence,
-            )
-        )
+    first, *others = group.strategies
+    rows = [ForestRow(first.name, first.words, texts[0], None)]
+    for strategy, text, pair in zip(others, texts[1:], comparisons, strict=True):
+        places = map(place, (pair.mean, pair.low, pair.high))
+        rows.append(ForestRow(strategy.name, strategy.words, text, pair, *places))
     return Forest(
         heading(comparison),
         named_in("OSPA", comparison.unit),
-        named_in(f"Difference to {strategies[0].name}", comparison.unit) + ", 95 % interval",
+        named_in(f"Difference to {first.name}", comparison.unit) + ", 95 % interval",
         tuple(rows),
         tuple((place(tick) or 0.0, with_minus(f"{tick:g}")) for tick in ticks),
         significance(comparison),
