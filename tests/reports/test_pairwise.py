@@ -9,7 +9,7 @@ from evaluation.synthetic import make_record
 from vedette.evaluation import Comparison
 from vedette.evaluation.ensembles import build_ensemble
 from vedette.evaluation.health import percent
-from vedette.reports.pairwise import all_pairs, compare_pair, compare_with_first
+from vedette.reports.pairwise import PairwiseComparison, all_pairs, compare_with_first
 
 
 def comparison_of(*errors: list[float]) -> Comparison:
@@ -25,8 +25,14 @@ def comparison_of(*errors: list[float]) -> Comparison:
     return Comparison(names, tuple(ensembles), 0.0, 2.0)
 
 
+def only_pair(comparison: Comparison) -> PairwiseComparison:
+    """The comparison of a with b, where there are no others."""
+    (found,) = compare_with_first(comparison)
+    return found
+
+
 def test_a_clear_difference_is_claimed_with_its_interval_and_share() -> None:
-    found = compare_pair(comparison_of([1.0, 2.0, 3.0, 4.0], [2.0, 3.1, 3.9, 5.0]), "a", "b")
+    found = only_pair(comparison_of([1.0, 2.0, 3.0, 4.0], [2.0, 3.1, 3.9, 5.0]))
     assert found.verdict == "better"
     assert found.sentence == (
         "A has a smaller mean OSPA than b, by 1.00 m (95 % interval 0.87 to 1.13 m, 4 paired runs). "
@@ -37,25 +43,23 @@ def test_a_clear_difference_is_claimed_with_its_interval_and_share() -> None:
 
 def test_whole_states_have_no_unit() -> None:
     errors = [1.0, 2.0, 3.0, 4.0], [2.0, 3.1, 3.9, 5.0]
-    there, back = (compare_pair(replace(comparison_of(*of), unit=""), "a", "b") for of in (errors, errors[::-1]))
+    there, back = (only_pair(replace(comparison_of(*of), unit="")) for of in (errors, errors[::-1]))
     assert "than b, by 1.00 (95 % interval 0.87 to 1.13, 4" in there.sentence
     assert "larger mean OSPA than b, by 1.00 (" in back.sentence
-    unclear = compare_pair(replace(comparison_of([1.0, 2.0, 3.0, 4.0], [2.0, 1.0, 3.0, 4.5]), unit=""), "a", "b")
+    unclear = only_pair(replace(comparison_of([1.0, 2.0, 3.0, 4.0], [2.0, 1.0, 3.0, 4.5]), unit=""))
     assert "B minus a: 0.12 (95 % interval" in unclear.sentence.replace("b minus", "B minus")
-    assert (
-        "b minus a: 2.00 in mean OSPA" in compare_pair(replace(comparison_of([1.0], [3.0]), unit=""), "a", "b").sentence
-    )
+    assert "b minus a: 2.00 in mean OSPA" in only_pair(replace(comparison_of([1.0], [3.0]), unit="")).sentence
 
 
 def test_the_other_way_round_is_worse() -> None:
-    found = compare_pair(comparison_of([2.0, 3.1, 3.9, 5.0], [1.0, 2.0, 3.0, 4.0]), "a", "b")
+    found = only_pair(comparison_of([2.0, 3.1, 3.9, 5.0], [1.0, 2.0, 3.0, 4.0]))
     assert found.verdict == "worse"
     assert found.sentence.startswith("A has a larger mean OSPA than b, by 1.00 m (95 % interval 0.87 to 1.13 m, ")
     assert found.sentence.endswith("It is smaller in only 0 % of the runs.")
 
 
 def test_an_interval_that_holds_zero_tells_nothing_apart() -> None:
-    found = compare_pair(comparison_of([1.0, 2.0, 3.0, 4.0], [2.0, 1.0, 3.0, 4.5]), "a", "b")
+    found = only_pair(comparison_of([1.0, 2.0, 3.0, 4.0], [2.0, 1.0, 3.0, 4.5]))
     assert found.verdict == "unclear"
     assert found.sentence.startswith("A and b do not differ significantly in mean OSPA. ")
     assert "(95 % interval \N{MINUS SIGN}1.23 to 1.48 m, 4 paired runs)" in found.sentence
@@ -63,11 +67,11 @@ def test_an_interval_that_holds_zero_tells_nothing_apart() -> None:
 
 
 def test_equal_strategies_do_not_differ() -> None:
-    assert compare_pair(comparison_of([1.0, 2.0], [1.0, 2.0]), "a", "b").verdict == "unclear"
+    assert only_pair(comparison_of([1.0, 2.0], [1.0, 2.0])).verdict == "unclear"
 
 
 def test_one_run_has_no_significance() -> None:
-    found = compare_pair(comparison_of([1.0], [3.0]), "a", "b")
+    found = only_pair(comparison_of([1.0], [3.0]))
     assert found.verdict == "unknown"
     assert found.sentence.startswith("One run proves nothing. ")
     assert found.difference == "+2.00"
@@ -81,7 +85,7 @@ def test_the_first_is_compared_with_each_and_every_pair_is_listed() -> None:
 
 def test_claims_that_stand_together_allow_for_their_number() -> None:
     errors = [[1.0, 2.0, 3.0, 4.0], [1.1, 3.0, 4.2, 4.8], [2.0, 3.1, 3.9, 5.0]]
-    alone = compare_pair(comparison_of(*errors), "a", "b")
+    alone = only_pair(comparison_of(*errors[:2]))
     together = compare_with_first(comparison_of(*errors))
     assert (alone.verdict, [each.verdict for each in together]) == ("better", ["better", "better"])
     assert together[0].sentence.endswith("of the runs (p = 0.048 among 2 comparisons).")

@@ -53,13 +53,8 @@ def all_pairs(comparison: Comparison) -> tuple[PairwiseComparison, ...]:
     return _compare_pairs(comparison, [(first, second) for i, first in enumerate(names) for second in names[i + 1 :]])
 
 
-def compare_pair(comparison: Comparison, first: str, second: str) -> PairwiseComparison:
-    """Compare two strategies in mean OSPA over the counted scans of paired runs, without correction for other pairs."""
-    return _compare_pairs(comparison, [(first, second)])[0]
-
-
 def _compare_pairs(comparison: Comparison, pairs: Sequence[tuple[str, str]]) -> tuple[PairwiseComparison, ...]:
-    """Compare pairs of strategies, corrected for their number by Holm's method."""
+    """Compare pairs in mean OSPA over the counted scans of paired runs, corrected for their number by Holm's method."""
     differences = [comparison.difference(second, first) for first, second in pairs]
     p_values = holm(np.array([paired.p_value for paired in differences]))
     return tuple(
