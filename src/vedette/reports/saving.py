@@ -10,7 +10,7 @@ from vedette.campaigns.results import CampaignResults
 from vedette.errors import InputError
 from vedette.evaluation.figures import overview_figure, save_figure
 from vedette.evaluation.tables import decisions_markdown, strategy_csv, strategy_markdown
-from vedette.internal.files import write_whole
+from vedette.internal.files import write_file
 from vedette.kernels.base.types import Floats
 from vedette.reports.drawings import Drawing, group_drawings, sweep_drawings, typical_records
 from vedette.reports.groups import Group, comparison_groups, group_of_run
@@ -29,12 +29,8 @@ def write_summary(results: CampaignResults, folder: Path) -> tuple[Path, ...]:
     groups = [group for group in comparison_groups(results) if group.comparison is not None]
     compared = {group.name: group.comparison for group in groups if group.comparison is not None}
     contents = {MARKDOWN: "\n".join(map(_markdown, groups)), CSV: strategy_csv(compared)}
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        for name, text in contents.items():
-            write_whole(folder / name, lambda file, text=text: file.write(text.encode()))  # type: ignore[misc]
-    except OSError as error:
-        raise InputError(f"{folder}: expected a place to write a summary; got {error}") from error
+    for name, text in contents.items():
+        write_file(folder / name, lambda file, text=text: file.write(text.encode()), make_folder=True)  # type: ignore[misc]
     return tuple(folder / name for name in contents)
 
 
