@@ -9,7 +9,7 @@ from typing import Any, TypeAlias
 
 import numpy as np
 
-from vedette.errors import InputError
+from vedette.errors import InputError, VedetteError
 from vedette.internal.quantities import COMPONENTS, HEIGHT_DEPENDENT, PLACED, QUANTITIES, is_doppler, si_column
 from vedette.kernels.base.types import BEAM, HEADING, OWN_HEIGHT, OWN_VELOCITY, Floats
 from vedette.models.arguments import reject
@@ -77,6 +77,16 @@ def scans_of_record(record: RunRecord, scenario: Scenario) -> Scans:
     true, times = build_true_sensors(scenario, sensors), build_scan_times(scenario)
     scans_at = scan_flags_of_run(times, scan_loss_probabilities(scenario), record.num_scans, record.seed, record.run)
     return scans_of_sensors(record, len(true), partial(sensors_at_step, true, scans_at))
+
+
+def available_scans(record: RunRecord, scenario: Scenario, trust: bool) -> Scans:
+    """Return the scans of a run, empty if they are not available, or need custom code that is not trusted."""
+    if measurement_code(scenario) and not trust:
+        return ()
+    try:
+        return scans_of_record(record, scenario)
+    except VedetteError:
+        return ()
 
 
 def rows_of_record(record: RunRecord, scenario: Scenario) -> Rows:

@@ -10,13 +10,12 @@ import numpy as np
 
 from vedette.control.plan import Plan
 from vedette.densities import Estimate, UndetectedIntensity
-from vedette.errors import VedetteError
 from vedette.evaluation import match_run
 from vedette.evaluation.actions import action_axis, describe_choice
 from vedette.evaluation.ensembles import rounded_choice
 from vedette.evaluation.figures.rewards import best_over_others, best_over_pair, first_pair
 from vedette.evaluation.recording_metadata import recording_metadata
-from vedette.evaluation.scans import PLANE_SHAPES, measurement_code, plane_coordinates, scans_of_record
+from vedette.evaluation.scans import PLANE_SHAPES, available_scans, plane_coordinates
 from vedette.kernels.base.types import HEADING, HEIGHT, VELOCITY, VY, Floats, place_of
 from vedette.reports.decision_explanations import explanation_data
 from vedette.reports.groups import Strategy
@@ -223,15 +222,10 @@ def _scans(record: RunRecord, scenario: Scenario, decimals: int, trust: bool) ->
     Empty if the models of the scenario, or its recording, are not available.
     """
     kinds = [sensor.measurement.kind for sensor in scenario.model.sensors]
-    if not PLANE_SHAPES.keys() & set(kinds) or (measurement_code(scenario) and not trust):
-        return []
-    try:
-        scans = scans_of_record(record, scenario)
-    except VedetteError:
-        return []
+    scans = available_scans(record, scenario, trust) if PLANE_SHAPES.keys() & set(kinds) else ()
     return [
         [measurement_data(scan, kind, pose, decimals) for scan, kind, pose in zip(sensors, kinds, poses, strict=True)]
-        for sensors, poses in zip(scans, record.poses, strict=True)
+        for sensors, poses in zip(scans, record.poses, strict=False)
     ]
 
 

@@ -17,7 +17,7 @@ from matplotlib.collections import LineCollection
 from matplotlib.patches import Circle, Ellipse
 from numpy.typing import NDArray
 
-from vedette.errors import InputError, VedetteError
+from vedette.errors import InputError
 from vedette.evaluation.figures.labels import drawn_text, short_label
 from vedette.evaluation.figures.scene import build_scene, draw_field, draw_zones, place_names
 from vedette.evaluation.figures.style import COLUMN_WIDTH, GREY, INK, colour, new_figure, styled
@@ -31,7 +31,7 @@ from vedette.evaluation.figures.tracks import (
     plot_extent,
 )
 from vedette.evaluation.recording_metadata import recording_metadata
-from vedette.evaluation.scans import PLANE_SHAPES, Scans, measurement_code, plane_coordinates, scans_of_record
+from vedette.evaluation.scans import PLANE_SHAPES, available_scans, plane_coordinates
 from vedette.evaluation.track_formats import utc_text
 from vedette.internal.files import write_file
 from vedette.internal.text import elided
@@ -144,7 +144,7 @@ class _Drawing:
 
     def __init__(self, record: RunRecord, scenario: Scenario, trust: bool) -> None:
         self._record, self._scenario = record, scenario
-        self._scans = _available_scans(record, scenario, trust)
+        self._scans = available_scans(record, scenario, trust)
         self._scene, self._metadata = build_scene(scenario, record.planner), recording_metadata(record, scenario)
         self._scale = 1e-3 if plot_extent([record]) > LARGE else 1.0
         self.figure = new_figure(COLUMN_WIDTH + 0.75)
@@ -282,16 +282,6 @@ class _Drawing:
             else:
                 size = 2.5 if is_clutter else 4.0
                 self._add(self._axes.plot(*shown.T, linestyle="", marker="x", markersize=size, mew=0.7, **style)[0])
-
-
-def _available_scans(record: RunRecord, scenario: Scenario, trust: bool) -> Scans:
-    """Return the scans of a run, empty if they are not available, or need custom code that is not trusted."""
-    if measurement_code(scenario) and not trust:
-        return ()
-    try:
-        return scans_of_record(record, scenario)
-    except VedetteError:
-        return ()
 
 
 def _colour_indices(labels: Ints) -> dict[tuple[int, ...], int]:
