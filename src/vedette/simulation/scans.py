@@ -201,14 +201,6 @@ def _noise_factors(sensor: SensorModel, states: Floats, pose: Floats) -> Floats:
     try:
         return np.asarray(np.linalg.cholesky(covs), dtype=np.float64)
     except np.linalg.LinAlgError:
-        bad = next(i for i, cov in enumerate(covs) if not _is_positive_definite(cov))
+        bad = np.linalg.eigvalsh(covs)[:, 0].argmin()
         message = f"expected a positive definite covariance; got {covs[bad].tolist()}"
         raise ModelError(f"noise model at state {states[bad]}, pose {pose}: {message}") from None
-
-
-def _is_positive_definite(cov: Floats) -> bool:
-    try:
-        np.linalg.cholesky(cov)
-    except np.linalg.LinAlgError:
-        return False
-    return True
