@@ -54,5 +54,5 @@ def test_clear_mot(case: dict[str, Any]) -> None:
     assert distances.mean() == pytest.approx(case["motp"])
     series = gospa_of_run(truth, estimates, cutoff=cutoff, order=1.0)
     breaks = continuity_of_run(truth, estimates, cutoff=cutoff, order=1.0)
-    faults = series.num_missed.sum() + series.num_false.sum() + breaks.num_label_switches
+    faults = series.num_missed.sum() + series.num_false.sum() + breaks.label_switches.sum()
     assert 1.0 - faults / alive.sum() == pytest.approx(case["mota"])

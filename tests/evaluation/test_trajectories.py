@@ -58,8 +58,8 @@ def test_of_one_target(alive: str, labels: str, switches: str, fragmentations: s
     result = of_one_target(alive, labels)
     assert "".join(map(str, result.label_switches)) == switches
     assert "".join(map(str, result.fragmentations)) == fragmentations
-    assert result.num_label_switches == sum(map(int, switches))
-    assert result.num_fragmentations == sum(map(int, fragmentations))
+    assert result.label_switches.sum() == sum(map(int, switches))
+    assert result.fragmentations.sum() == sum(map(int, fragmentations))
 
 
 def test_two_targets_that_trade_their_labels_are_two_switches() -> None:

@@ -31,16 +31,6 @@ class Continuity:
     label_switches: Ints
     fragmentations: Ints
 
-    @property
-    def num_label_switches(self) -> int:
-        """Number of label switches in the whole run."""
-        return int(self.label_switches.sum())
-
-    @property
-    def num_fragmentations(self) -> int:
-        """Number of fragmentations in the whole run."""
-        return int(self.fragmentations.sum())
-
 
 def continuity_of_run(truth: Truth, estimates: Sequence[Estimate], *, cutoff: float, order: float) -> Continuity:
     """Return the label switches and fragmentations of a run. Raise `InputError` as `match_run` does."""
