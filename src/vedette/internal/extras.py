@@ -39,7 +39,7 @@ def require_packages(what: str, *packages: str) -> None:
 
 def without(what: str, *packages: str) -> str:
     """Return a message if packages (keys of `EXTRA_OF`) that `what` needs are missing, else an empty text."""
-    missing = [package for package in packages if not _is_installed(package)]
+    missing = [package for package in packages if not is_installed(package)]
     if not missing:
         return ""
     extras = {EXTRA_OF[package] for package in missing}
@@ -48,7 +48,8 @@ def without(what: str, *packages: str) -> str:
     return f"{what} needs {' and '.join(missing)}, {which}: pip install 'vedette[{names}]'"
 
 
-def _is_installed(package: str) -> bool:
+def is_installed(package: str) -> bool:
+    """Return True if Python finds a package, without importing it."""
     try:
         return find_spec(package) is not None
     except (ImportError, ValueError):  # raised by a parent package or an import hook

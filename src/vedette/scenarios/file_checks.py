@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import ast
 import csv
-import importlib.util
 import os
 import symtable
 import tokenize
@@ -15,6 +14,7 @@ from pathlib import Path as FilePath
 import numpy as np
 
 from vedette.errors import InputError
+from vedette.internal.extras import is_installed
 from vedette.internal.text import elided, printable
 from vedette.scenarios.diagnostics import Finding, Path, describe, shown_key
 from vedette.scenarios.recorded_data import recorded_targets
@@ -97,13 +97,6 @@ def _column_findings(recorded: RecordedTargets, file: FilePath) -> Iterator[Find
         yield ("targets", "columns"), wanted, "nothing"
 
 
-def _is_findable(package: str) -> bool:
-    try:
-        return importlib.util.find_spec(package) is not None
-    except ValueError:  # raised for a module without a specification, such as the running program
-        return False
-
-
 def _undefined_name(file: FilePath, name: str) -> tuple[str, str] | None:
     """Return a fault if a file is not valid Python or does not define the name; the file is not run."""
     try:
@@ -124,7 +117,7 @@ def _undefined_name(file: FilePath, name: str) -> tuple[str, str] | None:
 def reference_findings(model: ScenarioModel, folder: FilePath) -> Iterator[Finding]:
     """Yield faults of custom code that cannot be found. Nothing is imported."""
     for path, custom in custom_objects(model):
-        yield from readable_findings(_reference_findings(path, custom, folder))
+        yield from readable_findings(_reference_findings, path, custom, folder)
 
 
 def _reference_findings(path: Path, custom: Custom, folder: FilePath) -> Iterator[Finding]:
@@ -135,5 +128,5 @@ def _reference_findings(path: Path, custom: Custom, folder: FilePath) -> Iterato
             yield (*path, "function"), f"a file, relative to the scenario file{copied}", _missing_file(module)
         elif fault := _undefined_name(folder / module, name.partition(".")[0]):
             yield (*path, "function"), *fault
-    elif not _is_findable(module.partition(".")[0]):
+    elif not is_installed(module.partition(".")[0]):
         yield (*path, "function"), "a module that Python finds", describe(module)

@@ -99,10 +99,8 @@ def diagnose(document: Document, folder: FilePath | None) -> tuple[ScenarioModel
     data, zone_diagnostics = with_zones(document.data, root)
     model, diagnostics = read_section(ScenarioModel, data)
     diagnostics += zone_diagnostics
-    checks = (recorded_findings, recording_findings, reference_findings, coastline_findings)
-    all_findings = (findings(model, root) for findings in checks)
-    for findings in all_findings:
-        diagnostics += [Diagnostic(*finding) for finding in readable_findings(findings)]
+    for findings in (recorded_findings, recording_findings, reference_findings, coastline_findings):
+        diagnostics += [Diagnostic(*finding) for finding in readable_findings(findings, model, root)]
     faults += [locate_fault(document, fault) for fault in diagnostics]
     return (None if faults else model), _unique(faults)
 

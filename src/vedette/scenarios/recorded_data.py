@@ -100,7 +100,7 @@ def recording_findings(world: ScenarioModel, folder: Path) -> Iterator[Finding]:
     section = world.recording
     if section is None:
         return
-    yield from readable_findings(_content(section, world, folder))
+    yield from readable_findings(_content, section, world, folder)
     if world.targets.kind not in ("recorded", "unknown"):
         yield ("targets", "kind"), "recorded or unknown, as the scans are recorded", describe(world.targets.kind)
     if world.decision_steps:

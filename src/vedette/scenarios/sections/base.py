@@ -131,10 +131,10 @@ def check(findings: Check) -> Check:
     return findings
 
 
-def readable_findings(findings: Iterator[Finding]) -> Iterator[Finding]:
-    """Yield the findings up to the first that needs a value that could not be read."""
+def readable_findings(findings: Callable[..., Iterator[Finding]], *arguments: Any) -> Iterator[Finding]:
+    """Yield the findings for these arguments up to the first that needs a value that could not be read."""
     try:
-        yield from findings
+        yield from findings(*arguments)
     except UnreadableValueError:
         return
 
@@ -185,7 +185,7 @@ class Section(BaseModel):
     def findings(self) -> Iterator[Finding]:
         """Yield the faults of the section that no single field has."""
         for method in self._checks:
-            yield from readable_findings(method(self))
+            yield from readable_findings(method, self)
 
     @check
     def _numbers_within_reason(self) -> Iterator[Finding]:

@@ -49,9 +49,7 @@ class BirthSite(Section):
         if (self.std is None) == (self.cov is None):
             yield (), "either std or cov", "both" if self.std else "neither"
 
-    @check
-    def _positive(self) -> Iterator[Finding]:
-        yield from _spreads(self.std or ())
+    _positive = check(lambda self: _spreads(self.std or ()))
 
     def covariance(self) -> Floats:
         """Return the covariance of the state, in the order of the file."""
@@ -73,9 +71,7 @@ class MeasuredBirth(Section):
     )
     std: Reals = Field(description="Standard deviation of each state component of a birth [m, m/s, ...].")
 
-    @check
-    def _positive(self) -> Iterator[Finding]:
-        yield from _spreads(self.std)
+    _positive = check(lambda self: _spreads(self.std))
 
 
 class Birth(Section):

@@ -109,13 +109,8 @@ class Control(Derived):
         if len(given) > 1:
             yield (), f"one of {', '.join(_SCHEDULES)}", " and ".join(given)
 
-    @check
-    def _steps_in_order(self) -> Iterator[Finding]:
-        yield from _order("decision_steps", self.decision_steps or ())
-
-    @check
-    def _times_in_order(self) -> Iterator[Finding]:
-        yield from _order("decision_times", self.decision_times or ())
+    _steps_in_order = check(lambda self: _order("decision_steps", self.decision_steps or ()))
+    _times_in_order = check(lambda self: _order("decision_times", self.decision_times or ()))
 
     @check
     def _confidence_for_sampling_settings(self) -> Iterator[Finding]:

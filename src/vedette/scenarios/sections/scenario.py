@@ -134,9 +134,9 @@ class ScenarioModel(ScenarioFields):
     def _birth_sites(self) -> Iterator[Finding]:
         for i, site in enumerate(self.birth.sites):
             path: Path = ("birth", "sites", i)
-            yield from readable_findings(_state_length((*path, "mean"), site, "mean", self))
-            yield from readable_findings(_state_length((*path, "std"), site, "std", self))
-            yield from readable_findings(_covariance((*path, "cov"), site, self))
+            yield from readable_findings(_state_length, (*path, "mean"), site, "mean", self)
+            yield from readable_findings(_state_length, (*path, "std"), site, "std", self)
+            yield from readable_findings(_covariance, (*path, "cov"), site, self)
 
     _births_cut = check(births_cut)
 
@@ -144,7 +144,7 @@ class ScenarioModel(ScenarioFields):
     def _targets(self) -> Iterator[Finding]:
         if self.targets.kind == "poisson":
             for name in ("mean", "std"):
-                yield from readable_findings(_state_length(("targets", name), self.targets, name, self))
+                yield from readable_findings(_state_length, ("targets", name), self.targets, name, self)
         if self.targets.kind == "uniform" and len(self.targets.std) != (rest := len(self.motion.components) - 2):
             wanted = f"{rest} numbers, as a state under motion has but the position"
             yield ("targets", "std"), wanted, describe(self.targets.std)
@@ -153,9 +153,9 @@ class ScenarioModel(ScenarioFields):
         for i, target in enumerate(self.targets.tracks):
             path: Path = ("targets", "tracks", i)
             for name in ("state", "std"):
-                yield from readable_findings(_state_length((*path, name), target, name, self))
+                yield from readable_findings(_state_length, (*path, name), target, name, self)
             for name in ("start_step", "end_step"):
-                yield from readable_findings(_last_step((*path, name), target, name, self))
+                yield from readable_findings(_last_step, (*path, name), target, name, self)
 
     @check
     def _unknown_targets(self) -> Iterator[Finding]:
@@ -166,12 +166,12 @@ class ScenarioModel(ScenarioFields):
     def _sensor_names(self) -> Iterator[Finding]:
         names: set[str] = set()
         for i, sensor in enumerate(self.sensors):
-            yield from readable_findings(_name_once(("sensors", i, "name"), sensor, names))
+            yield from readable_findings(_name_once, ("sensors", i, "name"), sensor, names)
 
     @check
     def _scan_steps(self) -> Iterator[Finding]:
         for i, sensor in enumerate(self.sensors):
-            yield from readable_findings(_first_scan(("sensors", i, "scans"), sensor, self))
+            yield from readable_findings(_first_scan, ("sensors", i, "scans"), sensor, self)
 
     @check
     def _scans_of_unlabelled(self) -> Iterator[Finding]:
@@ -194,7 +194,7 @@ class ScenarioModel(ScenarioFields):
     @check
     def _score(self) -> Iterator[Finding]:
         for name in ("first_scan", "last_scan"):
-            yield from readable_findings(_last_step(("ospa", name), self.ospa, name, self))
+            yield from readable_findings(_last_step, ("ospa", name), self.ospa, name, self)
         components, motion = self.ospa.components, self.motion
         if components == "state" and self.targets.kind == "recorded" and len(motion.components) != len(PLANE):
             wanted = f"position, as states have {len(motion.components)} components and recorded targets {len(PLANE)}"
@@ -205,11 +205,9 @@ class ScenarioModel(ScenarioFields):
     @check
     def _checks_of_other_files(self) -> Iterator[Finding]:
         for findings in (cells_of_undetected, learnt_births, *CONSISTENCY_CHECKS):
-            yield from readable_findings(findings(self))
+            yield from readable_findings(findings, self)
 
-    @check
-    def _places(self) -> Iterator[Finding]:
-        yield from misplaced_findings(self, self.origin)
+    _places = check(lambda self: misplaced_findings(self, self.origin))
 
 
 def _up_to_last(path: Path, step: int | None, last: int) -> Iterator[Finding]:

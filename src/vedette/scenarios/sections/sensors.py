@@ -246,17 +246,9 @@ class Sensor(Section):
         if self.height and kind not in (*HEIGHT_DEPENDENT, "custom"):
             yield ("height",), f"0, as a {kind} measurement does not depend on heights", describe(self.height)
 
-    @check
-    def _noise_fits(self) -> Iterator[Finding]:
-        yield from noise_findings(self.measurement, self.noise, ("noise",))
-
-    @check
-    def _clutter_is_for_the_measurement(self) -> Iterator[Finding]:
-        yield from clutter_findings(self.measurement, self.clutter, ("clutter",))
-
-    @check
-    def _clutter_is_a_box(self) -> Iterator[Finding]:
-        yield from clutter_box_findings(self.measurement, self.clutter, ("clutter",))
+    _noise_fits = check(lambda self: noise_findings(self.measurement, self.noise, ("noise",)))
+    _clutter_is_measured = check(lambda self: clutter_findings(self.measurement, self.clutter, ("clutter",)))
+    _clutter_is_a_box = check(lambda self: clutter_box_findings(self.measurement, self.clutter, ("clutter",)))
 
     @check
     def _bias_is_of_what_is_measured(self) -> Iterator[Finding]:

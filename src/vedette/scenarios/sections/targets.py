@@ -56,9 +56,7 @@ class ScriptedTarget(Section):
         "none: the same in every run [m, m/s, ...].",
     )
 
-    @check
-    def _not_negative(self) -> Iterator[Finding]:
-        yield from _negative_stds(self.std or ())
+    _not_negative = check(lambda self: _negative_stds(self.std or ()))
 
     @check
     def _lifetime(self) -> Iterator[Finding]:
@@ -204,9 +202,7 @@ class PoissonTargets(Section):
         default=0.0, description="Probability with which a target dies from scan to scan [-]."
     )
 
-    @check
-    def _spreads(self) -> Iterator[Finding]:
-        yield from _negative_stds(self.std)
+    _spreads = check(lambda self: _negative_stds(self.std))
 
     def expected_number(self, num_steps: int) -> float | None:
         """Return the mean number of targets at the last scan, if none leaves the region; None without deaths."""
@@ -239,9 +235,7 @@ class UniformTargets(Section):
         default=0.0, description="Probability with which a target dies from scan to scan [-]."
     )
 
-    @check
-    def _spreads(self) -> Iterator[Finding]:
-        yield from _negative_stds(self.std)
+    _spreads = check(lambda self: _negative_stds(self.std))
 
     def expected_number(self, num_steps: int) -> float | None:
         """Return the mean number at every scan."""

@@ -49,19 +49,17 @@ class Time(Section):
         return round(position) if abs(position - round(position)) <= TIME_TOLERANCE else None
 
 
+def _not_above(name: str, value: float, other: str, least: float) -> Iterator[Finding]:
+    if value <= least:
+        yield (name,), f"a number above {other}, {least:g}", describe(value)
+
+
 @derived("vedette.models.region:Region")
 class RegionSection(Part):
     """The surveillance region: a rectangle, x to the east and y to the north."""
 
-    @check
-    def _width(self) -> Iterator[Finding]:
-        if self.x_max <= self.x_min:
-            yield ("x_max",), f"a number above x_min, {self.x_min:g}", describe(self.x_max)
-
-    @check
-    def _height(self) -> Iterator[Finding]:
-        if self.y_max <= self.y_min:
-            yield ("y_max",), f"a number above y_min, {self.y_min:g}", describe(self.y_max)
+    _width = check(lambda self: _not_above("x_max", self.x_max, "x_min", self.x_min))
+    _height = check(lambda self: _not_above("y_max", self.y_max, "y_min", self.y_min))
 
 
 StateOrder = Annotated[
