@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from typing import Any
 
-from vedette.errors import ScenarioError
+from vedette.errors import InputError, ScenarioError
 from vedette.scenarios.diagnostics import Path, format_path, shown_key
 from vedette.scenarios.loading import Scenario, diagnose
 from vedette.scenarios.validation import suggestion
@@ -32,7 +32,12 @@ def replace_fields(scenario: Scenario, fields: Mapping[str, Any]) -> Scenario:
         return scenario
     data = scenario.model.model_dump(mode="json")
     explicit = scenario.model.model_dump(mode="json", exclude_defaults=True)
-    faults = [fault for path, value in fields.items() for fault in _set(data, explicit, path, value)]
+    faults = []
+    for path, value in fields.items():
+        try:
+            _set(data, explicit, path, value)
+        except InputError as fault:
+            faults.append(str(fault))
     if faults:
         raise ScenarioError(faults)
     model, remaining = diagnose(Document(scenario.name, data, {}, {}, []), scenario.folder)
@@ -41,47 +46,33 @@ def replace_fields(scenario: Scenario, fields: Mapping[str, Any]) -> Scenario:
     return Scenario(model, scenario.path)
 
 
-def _set(data: Any, explicit: Any, path: str, value: Any) -> Iterator[str]:
-    """Set the value everywhere the path leads, in place; yields faults of the path. explicit: without defaults."""
+def _set(data: Any, explicit: Any, path: str, value: Any) -> None:
+    """Set the value everywhere the path leads, in place; raises `InputError` for a faulty path.
+
+    explicit: the data without defaults.
+    """
     *parents, last = path.split(".")
     places: list[tuple[Path, Any]] = [((), data)]
     for part in parents:
-        inner: list[tuple[Path, Any]] = []
-        for place, holder in places:
-            keys, fault = _keys(holder, place, part, path)
-            if fault:
-                yield fault
-                return
-            inner += [((*place, key), holder[key]) for key in keys]
-        places = inner
-    for place, holder in places:
-        keys, fault = _keys(holder, place, last, path)
-        if fault:
-            yield fault
-            return
-        for key in keys:
-            missing = _reset_keys(_value_at((*place, key), explicit), value)
-            if missing:
+        places = [((*at, key), holder[key]) for at, holder in places for key in _keys(holder, at, part, path)]
+    for at, holder in places:
+        for key in _keys(holder, at, last, path):
+            if missing := _reset_keys(_value_at((*at, key), explicit), value):
                 example = f"{shown_key(path)}.{shown_key(str(next(iter(value), missing[0])))}"
-                yield (
+                raise InputError(
                     f"{shown_key(path)}: expected the whole section, with {missing[0]} too, got a part of it "
                     f'(a field is set by its path in quotes: "{example}")'
                 )
-                return
             holder[key] = value
 
 
 def _value_at(path: Path, explicit: Any) -> Any:
     """Return the value at a path; None if it is the default."""
     for part in path:
-        if isinstance(explicit, dict):
-            explicit = explicit.get(part)
-        else:
-            explicit = (
-                explicit[part]
-                if isinstance(explicit, list) and isinstance(part, int) and part < len(explicit)
-                else None
-            )
+        try:
+            explicit = explicit[part]
+        except (KeyError, IndexError, TypeError):
+            return None
     return explicit
 
 
@@ -95,26 +86,20 @@ def _reset_keys(present: Any, value: Any) -> list[str]:
     return sorted({key for key, own in present.items() if own is not None} - value.keys())
 
 
-def _keys(holder: Any, place: Path, part: str, path: str) -> tuple[list[Any], str]:
-    """Return the keys or indices that one part of a path means in a mapping or list, or else the fault of the path."""
-    where = format_path(place) or "the scenario"
+def _keys(holder: Any, place: Path, part: str, path: str) -> list[Any]:
+    """Return the keys or indices that one part of a path means in a mapping or list. Raises `InputError` for others."""
+    where, shown = format_path(place) or "the scenario", shown_key(part)
     if isinstance(holder, list):
         if part == ALL_ITEMS:
-            return list(range(len(holder))), ""
+            return list(range(len(holder)))
         if _INDEX.fullmatch(part) and int(part) < len(holder):
-            return [int(part)], ""
-        return (
-            [],
-            f"{shown_key(path)}: expected * or a number below {len(holder)} after {where}, got '{shown_key(part)}'",
-        )
-    if not isinstance(holder, dict):
-        return (
-            [],
-            f"{shown_key(path)}: expected a section at {where} for '{shown_key(part)}' to be in, got a single value",
-        )
-    if part not in holder:
+            return [int(part)]
+        fault = f"expected * or a number below {len(holder)} after {where}, got '{shown}'"
+    elif not isinstance(holder, dict):
+        fault = f"expected a section at {where} for '{shown}' to be in, got a single value"
+    elif part in holder:
+        return [part]
+    else:
         hint = "what sensors share is set by sensors.*" if part == "sensor_defaults" else suggestion(part, list(holder))
-        known = ", ".join(sorted(holder))
-        fault = f"expected one of {known} in {where}, got '{shown_key(part)}'"
-        return [], f"{shown_key(path)}: {fault}" + (f" ({hint})" if hint else "")
-    return [part], ""
+        fault = f"expected one of {', '.join(sorted(holder))} in {where}, got '{shown}'{f' ({hint})' if hint else ''}"
+    raise InputError(f"{shown_key(path)}: {fault}")
