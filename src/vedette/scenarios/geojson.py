@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 from vedette.errors import InputError
 from vedette.internal.reading import parse_json, read_text
 from vedette.scenarios.diagnostics import Diagnostic, Path, describe
-from vedette.scenarios.sections.places import OriginSection
+from vedette.scenarios.sections.places import read_origin
 
 if TYPE_CHECKING:  # importing it imports the filters, which a check does not need
     from vedette.recorded import Origin
@@ -40,7 +40,7 @@ def with_zones(data: Mapping[str, Any], folder: FilePath) -> tuple[Mapping[str, 
             continue
         path: Path = ("control", "constraints", i, "geojson")
         try:
-            polygons = _read(constraint, _origin(data), folder)
+            polygons = _read(constraint, read_origin(data), folder)
         except InputError as error:
             faults.append(Diagnostic(path, "a GeoJSON file of polygons", str(error)))
             polygons = [[[[0.0, 0.0], [1e3, 0.0], [0.0, 1e3]]]]
@@ -57,15 +57,10 @@ def _names_file(constraint: Any) -> bool:
     return "geojson" in given and not {"region", "polygon"} & given
 
 
-def _origin(data: Mapping[str, Any]) -> Origin:
-    try:
-        return OriginSection.model_validate(data.get("origin")).build()
-    except ValueError:
-        raise InputError("longitudes and latitudes, of which the scenario has no valid `origin`") from None
-
-
-def _read(constraint: Mapping[str, Any], origin: Origin, folder: FilePath) -> list[list[Ring]]:
+def _read(constraint: Mapping[str, Any], origin: Origin | None, folder: FilePath) -> list[list[Ring]]:
     """Return the outer ring of each polygon and then its holes, m."""
+    if origin is None:
+        raise InputError("longitudes and latitudes, of which the scenario has no valid `origin`")
     name = constraint["geojson"]
     polygons = (
         polygon
