@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 
@@ -18,7 +18,7 @@ from vedette.cli.running import CodeTrust, check_planner, compile_if_cold, inter
 from vedette.cli.scenario_files import note_assumptions, print_warnings
 
 if TYPE_CHECKING:
-    from vedette.live import LiveLoop, LiveState, PersistentLoop
+    from vedette.live import LiveLoop, PersistentLoop
     from vedette.reports.live import LiveScreen
     from vedette.scenarios.from_recording import LiveScenario
 
@@ -118,17 +118,21 @@ def live(
 
     Reads one JSON line per scan, and writes estimates, and plans when a decision is due.
     """
-    from vedette.live import PersistentLoop
+    from vedette.live import PersistentLoop, build_live_loop
 
     sources = parse_sources(listen or ["stdin"], token)
     options = _LoopOptions(max_delay, max_lead, speed, planner, decide_every, planning_timeout, seed)
     live_scenario = _read_scenario(sensors, options, trust)
-    loop = _build_loop(live_scenario, options)
+    loop = build_live_loop(
+        live_scenario, planner, max_delay=max_delay, max_lead=max_lead, decide_every=decide_every, seed=seed
+    )
     in_use = options if loop.planner else options._replace(planner="")
     identity = hashlib.sha256(repr(tuple(in_use)).encode() + sensors.read_bytes()).hexdigest()
     screen = None
     if any(source.kind == "ws" for source in sources):
-        screen = _open_screen(live_scenario, loop, lambda: persistent.state)
+        from vedette.reports.live import LiveScreen
+
+        screen = LiveScreen(live_scenario.scenario, loop, lambda: persistent.state)
         loop = screen.live
     with interruptible("what came is kept where --snapshot or --record say so"):
         _compile(live_scenario, loop)
@@ -164,19 +168,6 @@ def _read_scenario(sensors: Path, options: _LoopOptions, trust: bool) -> LiveSce
     return live_scenario
 
 
-def _build_loop(live_scenario: LiveScenario, options: _LoopOptions) -> LiveLoop:
-    from vedette.live import build_live_loop
-
-    return build_live_loop(
-        live_scenario,
-        options.planner,
-        max_delay=options.max_delay,
-        max_lead=options.max_lead,
-        decide_every=options.decide_every,
-        seed=options.seed,
-    )
-
-
 def _compile(live_scenario: LiveScenario, loop: LiveLoop) -> None:
     """Compile what the loop calls, as clients would wait for it."""
     from vedette.live.building import warm_up
@@ -186,12 +177,6 @@ def _compile(live_scenario: LiveScenario, loop: LiveLoop) -> None:
     if not custom_code(live_scenario.scenario.model):
         with compiling():
             warm_up(loop)
-
-
-def _open_screen(live_scenario: LiveScenario, loop: LiveLoop, state: Callable[[], LiveState]) -> LiveScreen:
-    from vedette.reports.live import LiveScreen
-
-    return LiveScreen(live_scenario.scenario, loop, state)
 
 
 def _process(
