@@ -123,12 +123,9 @@ def _csv(table: Mapping[str, Sequence[Any]]) -> bytes:
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
     writer.writerow(table)
-    writer.writerows(map(_spreadsheet_cell, cells) for cells in zip(*table.values(), strict=True))
+    for cells in zip(*table.values(), strict=True):
+        writer.writerow([spreadsheet_text(cell) if isinstance(cell, str) else cell for cell in cells])
     return text.getvalue().encode()
-
-
-def _spreadsheet_cell(cell: Any) -> Any:
-    return spreadsheet_text(cell) if isinstance(cell, str) else cell
 
 
 def _parquet(table: Mapping[str, Sequence[Any]]) -> bytes:
