@@ -14,6 +14,7 @@ from vedette.scenarios.diagnostics import Path, format_path
 from vedette.scenarios.sections import ScenarioModel
 from vedette.scenarios.sections.birth import BirthSite
 from vedette.scenarios.sections.sensing import Measurement, Noise, components
+from vedette.scenarios.sections.sensors import Sensor
 from vedette.scenarios.sections.targets import ScriptedTargets
 from vedette.scenarios.sections.world import RegionSection, grouped_order
 
@@ -38,26 +39,27 @@ def implausible_settings(model: ScenarioModel) -> Iterator[tuple[Path, str]]:
 def _bearings(model: ScenarioModel) -> Iterator[tuple[Path, str]]:
     """Yield warnings of noise so large that bearings carry little information."""
     reported: list[Noise] = []  # noise that sensors share is reported once
-    for s, sensor in enumerate(model.sensors):
-        true = None if sensor.true_parameters is None else sensor.true_parameters.noise
-        for path, noise in ((("noise",), sensor.noise), (("true_parameters", "noise"), true)):
-            if noise is not None and noise not in reported:
-                reported.append(noise)
-                yield from _bearing_noise(("sensors", s, *path), sensor.measurement, noise)
+    for path, sensor, noise in _assumed_and_true(model, "noise"):
+        if noise not in reported:
+            reported.append(noise)
+            yield from _bearing_noise(path, sensor.measurement, noise)
 
 
 def _biases(model: ScenarioModel) -> Iterator[tuple[Path, str]]:
     """Yield warnings of implausibly large biases."""
+    for path, _, bias in _assumed_and_true(model, "bias"):
+        for name, largest in _MAX_BIAS.items():
+            if abs(value := getattr(bias, name)) > largest:
+                field = format_path((*path, name))
+                yield (*path, name), f"{field}: expected at most {largest:g} either way; got {value:g}"
+
+
+def _assumed_and_true(model: ScenarioModel, name: str) -> Iterator[tuple[Path, Sensor, Any]]:
+    """Yield a section of each sensor, and of its true parameters if they give it, with its path and the sensor."""
     for s, sensor in enumerate(model.sensors):
-        true = None if sensor.true_parameters is None else sensor.true_parameters.bias
-        for path, bias in ((("bias",), sensor.bias), (("true_parameters", "bias"), true)):
-            for name, largest in _MAX_BIAS.items():
-                if bias is not None and abs(value := getattr(bias, name)) > largest:
-                    field_path = ("sensors", s, *path, name)
-                    yield (
-                        field_path,
-                        f"{format_path(field_path)}: expected at most {largest:g} either way; got {value:g}",
-                    )
+        yield ("sensors", s, name), sensor, getattr(sensor, name)
+        if (true := getattr(sensor.true_parameters, name, None)) is not None:
+            yield ("sensors", s, "true_parameters", name), sensor, true
 
 
 def _bearing_noise(path: Path, measurement: Measurement, noise: Noise) -> Iterator[tuple[Path, str]]:
