@@ -123,9 +123,6 @@ def read_manifest(folder: Path) -> dict[str, Any]:
         raise InputError(f"{path}: expected the manifest of a results folder; got another file")
     sessions = manifest.get("sessions")
     check_version(manifest, sessions[-1] if isinstance(sessions, list) and sessions else None, path)
-    missing = [field for field in (*_FIXED, "num_runs", "sessions") if field not in manifest]
-    if missing:
-        raise InputError(f"{path}: expected a field {missing[0]}; it is cut short or altered")
     try:
         _Manifest.model_validate(manifest)
     except ValidationError as error:
