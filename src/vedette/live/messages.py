@@ -218,16 +218,12 @@ def _accuracy(data: Mapping[str, Any], num: int, site: RecordedSensor, place: st
             continue
         if not is_read:
             raise reject(f"{place}, {key}", f"none, as the sensors file gives no `{section}` of {site.name}", "some")
-        is_valid = _is_number if thing == "number" else _is_text
+        is_valid = _is_number if thing == "number" else lambda each: isinstance(each, str)
         are_valid = isinstance(cells, list) and all(each is None or is_valid(each) for each in cells)
         if not are_valid or len(cells) != num:
             raise reject(f"{place}, {key}", f"{pluralise(num, thing)} or null, one for each measurement", cells)
         found[name] = cells or [None]
     return found
-
-
-def _is_text(value: object) -> bool:
-    return isinstance(value, str)
 
 
 def _pose(given: Any, field: str, site: RecordedSensor) -> tuple[dict[str, float], list[float]]:

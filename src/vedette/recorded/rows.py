@@ -19,7 +19,7 @@ from vedette.recorded.columns import ScanColumns
 from vedette.recorded.conventions import GAPS, MOST, ONE_PLACE, ONE_PLACE_SHARE, OVER_A_TURN, OWN_SPEEDS, UNITS
 from vedette.recorded.geography import PLANE_REACH
 from vedette.recorded.scan_times import turned
-from vedette.recorded.tables import FARTHEST, LATEST, across_midnight, is_empty, is_number, number, seconds
+from vedette.recorded.tables import FARTHEST, LATEST, across_midnight, attempt, is_empty, is_number, number, seconds
 
 _OWN_POSE = ("own_x", "own_y", "own_lon", "own_lat", "own_heading")
 
@@ -99,10 +99,8 @@ class Rows(ScanColumns):
     def _seconds(self, i: int) -> float:
         """Return the time of a row, all as dates or all as numbers."""
         cell = self.table.columns[self._time][i]
-        try:
-            time = (1.0 if self.is_utc else self._time_unit) * seconds(cell)
-        except (TypeError, ValueError, OverflowError):
-            time = math.nan
+        read = attempt(seconds, cell)
+        time = math.nan if read is None else read * (1.0 if self.is_utc else self._time_unit)
         if not abs(time) <= LATEST or is_number(cell) == self.is_utc:
             limits = f"number of seconds from {-LATEST:g} to {LATEST:g} (of milliseconds: `units: {{time: ms}}`)"
             number = limits if abs(time) > LATEST else "finite number of seconds"
@@ -111,11 +109,8 @@ class Rows(ScanColumns):
 
     def _value(self, i: int, quantity: str) -> float:
         name, unit = self._columns[quantity]
-        try:
-            value = unit * number(self.table.columns[name][i])
-        except (TypeError, ValueError, OverflowError):
-            value = math.nan
-        if not math.isfinite(value):
+        read = attempt(number, self.table.columns[name][i])
+        if read is None or not math.isfinite(value := unit * read):
             raise self.table.fault(i, name, "a finite number")
         limit = MOST.get(quantity, FARTHEST)
         over = OVER_A_TURN if UNITS[quantity] is ANGLES else 1e-9 * limit

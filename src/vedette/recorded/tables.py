@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import numbers
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from datetime import UTC, datetime
 from decimal import Decimal
@@ -55,13 +55,7 @@ class Table:
 
     def numbers(self, name: str, largest: float) -> Floats:
         """Return a column of numbers of at most that size."""
-        cells = self.column(name)
-        values = np.empty(len(cells))
-        for i, cell in enumerate(cells):
-            try:
-                values[i] = number(cell)
-            except (TypeError, ValueError, OverflowError):
-                raise self.fault(i, name, "a finite number") from None
+        values = np.array([attempt(number, cell) for cell in self.column(name)], np.float64)
         if not np.isfinite(values).all():
             raise self.fault(int(np.argmin(np.isfinite(values))), name, "a finite number")
         if (wrong := np.abs(values) > largest).any():
@@ -74,14 +68,9 @@ class Table:
         if not are_dates(cells):
             unit = TIMES.get(name.rpartition("_")[2], 1.0)
             return across_midnight(unit * self.numbers(name, LATEST / unit))
-        values = np.empty(len(cells))
-        for i, cell in enumerate(cells):
-            try:
-                values[i] = seconds(cell)
-            except (TypeError, ValueError, OverflowError):
-                raise self.fault(i, name, "an ISO 8601 time") from None
-            if not abs(values[i]) <= LATEST:  # a number, infinite or not, among times
-                raise self.fault(i, name, "an ISO 8601 time")
+        values = np.array([attempt(seconds, cell) for cell in cells], np.float64)
+        if not (usable := np.abs(values) <= LATEST).all():
+            raise self.fault(int(np.argmin(usable)), name, "an ISO 8601 time")
         return values
 
     def labels(self, name: str) -> list[str]:
@@ -141,13 +130,17 @@ def is_empty(cell: Any) -> bool:
     return cell is None or cell != cell or str(cell).strip() == ""
 
 
+def attempt(read: Callable[[Any], float], cell: Any) -> float | None:
+    """Return what `number` or `seconds` reads in a cell, or None for a cell that it does not accept."""
+    try:
+        return read(cell)
+    except (TypeError, ValueError, OverflowError):
+        return None
+
+
 def is_number(cell: Any) -> bool:
     """Return True if `number` accepts the cell."""
-    try:
-        number(cell)
-    except (TypeError, ValueError, OverflowError):
-        return False
-    return True
+    return attempt(number, cell) is not None
 
 
 def are_dates(cells: Sequence[Any]) -> bool:
@@ -158,16 +151,8 @@ def are_dates(cells: Sequence[Any]) -> bool:
     num_numbers = sum(map(is_number, cells))
     if num_numbers == 0 or 2 * num_numbers > len(cells):
         return num_numbers == 0 and len(cells) > 0
-    dates = sum(_is_date(cell) for cell in cells if not is_number(cell))
+    dates = sum(attempt(seconds, cell) is not None for cell in cells if not is_number(cell))
     return dates > num_numbers or (dates == num_numbers and not is_number(cells[0]))
-
-
-def _is_date(cell: Any) -> bool:
-    try:
-        seconds(cell)
-    except (TypeError, ValueError, OverflowError):
-        return False
-    return True
 
 
 def seconds(time: Any) -> float:
