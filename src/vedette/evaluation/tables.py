@@ -13,7 +13,7 @@ import numpy as np
 from vedette.evaluation.actions import describe_choice
 from vedette.evaluation.comparison import Comparison
 from vedette.evaluation.ensembles import PARTS
-from vedette.evaluation.statistics import CONFIDENCE, PairedDifference, Summary, summarise
+from vedette.evaluation.statistics import CONFIDENCE, Summary, summarise
 from vedette.evaluation.tail_summary import strategy_tail, tail_sentence
 from vedette.internal.text import markdown_table, named_in, spreadsheet_text, with_error
 
@@ -195,19 +195,15 @@ def _row(comparison: Comparison, strategy: str) -> tuple[str, ...]:
     difference = comparison.difference(strategy)
     interval = f"{difference.summary.low:+.2f} to {difference.summary.high:+.2f}"
     has_interval = comparison.num_runs > 1
+    tied = f", {difference.tie_rate:.0%} tied" if difference.tie_rate > 0.0 else ""
     return (
         strategy,
         total,
         *parts,
         _mean_with_error(difference.summary, sign="+"),
         interval if has_interval else "unknown",
-        _win_text(difference) if has_interval else "unknown",
+        f"{difference.win_rate:.0%}{tied}" if has_interval else "unknown",
     )
-
-
-def _win_text(difference: PairedDifference) -> str:
-    tied = f", {difference.tie_rate:.0%} tied" if difference.tie_rate > 0.0 else ""
-    return f"{difference.win_rate:.0%}{tied}"
 
 
 def _mean_with_error(summary: Summary, sign: str = "") -> str:

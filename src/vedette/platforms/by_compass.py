@@ -51,11 +51,7 @@ class ByCompass:
 
     def actions(self, pose: Floats) -> Floats:
         """Return (num_actions, num_columns) the actions of the platform, in its order."""
-        return self._given(actions_at("platform", self.platform, pose).values, pose, fixed=True)
-
-    def of_plane(self, rows: Floats, pose: Floats) -> Floats:
-        """Return (num_rows, num_columns) rows of the platform's own columns, converted from angles in the plane."""
-        return self._given(rows, pose, fixed=False)
+        return self.converted(actions_at("platform", self.platform, pose).values, pose, fixed=True)
 
     def course(self, pose: Floats, action: Floats, times: Floats) -> Floats:
         """Return the course of the platform."""
@@ -69,12 +65,7 @@ class ByCompass:
         """Return whether the platform's actions let the sensor scan."""
         return scans_of("platform", self.platform, pose, self._own(actions, pose), times)
 
-    @property
-    def _parts(self) -> tuple[Platform, ...]:
-        platform = self.platform
-        return (platform.platform, platform.pointing) if isinstance(platform, MountedPlatform) else (platform,)
-
-    def _given(self, rows: Floats, pose: Floats, *, fixed: bool) -> Floats:
+    def converted(self, rows: Floats, pose: Floats, *, fixed: bool) -> Floats:
         """Return converted rows (num_rows, num_columns) of the platform's own columns.
 
         fixed: whether directions that do not depend on the pose are already relative to true north.
@@ -86,6 +77,11 @@ class ByCompass:
             compass = PlaneCompass() if fixed and _is_fixed(part) else self.compass
             found.append(_given(part, own, self._pose_of(part, pose), compass))
         return np.hstack(found)
+
+    @property
+    def _parts(self) -> tuple[Platform, ...]:
+        platform = self.platform
+        return (platform.platform, platform.pointing) if isinstance(platform, MountedPlatform) else (platform,)
 
     def _own(self, actions: Floats, pose: Floats) -> Floats:
         """Return (num_actions, num_columns of the platform) the platform's own rows of actions."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from functools import partial
 from typing import Any
@@ -94,8 +94,8 @@ def comparison_groups(results: CampaignResults) -> Iterator[Group]:
     campaign = results.campaign
     used_slugs: set[str] = set()
     for cells in campaign.groups():
-        shared = {axis: value for axis, value in cells[0].settings.items() if axis != campaign.compare}
-        used_slugs.add(name := unique_name(_slug(campaign, shared), used_slugs))
+        slug = _file_part("-".join(str(cells[0].settings[axis]) for axis in varying_axes(campaign))) or "all"
+        used_slugs.add(name := unique_name(slug, used_slugs))
         yield _group(results, cells, name, _title(campaign, cells[0]))
 
 
@@ -197,11 +197,6 @@ def _title(campaign: Campaign, cell: Cell) -> str:
     varying = varying_axes(campaign)
     shown = (axis for axis in cell.settings if axis in varying or axis == "scenario")
     return describe_settings(cell, shown) or campaign.name
-
-
-def _slug(campaign: Campaign, shared: Mapping[str, Any]) -> str:
-    parts = [str(value) for axis, value in shared.items() if axis in varying_axes(campaign)]
-    return _file_part("-".join(parts)) or "all"
 
 
 def _file_part(name: str) -> str:

@@ -35,7 +35,7 @@ from vedette.evaluation.scans import PLANE_SHAPES, available_scans, plane_coordi
 from vedette.evaluation.track_formats import utc_text
 from vedette.internal.files import write_file
 from vedette.internal.text import elided
-from vedette.kernels.base.types import Floats, Ints
+from vedette.kernels.base.types import Floats
 from vedette.scenarios import Scenario
 from vedette.simulation import CLUTTER
 from vedette.simulation.records import RunRecord
@@ -155,7 +155,8 @@ class _Drawing:
         frame_tracks(self._axes, [record], self._scale, self._scene)
         add_legend(self.figure, record, self._scene, is_video=True)
         labels = np.concatenate([estimate.labels for estimate in record.estimates])
-        self._places = _colour_indices(labels) if labels_recur(labels) else {}
+        places = {tuple(label): place for place, label in enumerate(np.unique(labels, axis=0).tolist())}
+        self._places: dict[tuple[int, ...], int] = places if labels_recur(labels) else {}
         self._shown: list[Artist] = []
         self._step = -1
         self.show(0)
@@ -282,7 +283,3 @@ class _Drawing:
             else:
                 size = 2.5 if is_clutter else 4.0
                 self._add(self._axes.plot(*shown.T, linestyle="", marker="x", markersize=size, mew=0.7, **style)[0])
-
-
-def _colour_indices(labels: Ints) -> dict[tuple[int, ...], int]:
-    return {tuple(label): index for index, label in enumerate(np.unique(labels, axis=0).tolist())}

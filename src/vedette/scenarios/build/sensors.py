@@ -154,7 +154,7 @@ def first_actions(scenario: Scenario, sensors: tuple[MobileSensor, ...]) -> tupl
         while isinstance(platform, PlatformWrapper):
             platform = platform.platform
         if row is not None and isinstance(platform, ByCompass):
-            rows = platform.of_plane(rows, pose)
+            rows = platform.converted(rows, pose, fixed=False)
         if row is not None and isinstance(sensor.platform, Operated):
             rows = sensor.platform.switched_on_and_off(rows)[:1]
         result.append(Actions(actions.columns, rows))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path as FilePath
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -140,13 +140,15 @@ def clutter_findings(measurement: Measurement, clutter: Clutter, path: Path) -> 
     most = getattr(clutter, "max_range_rate", None)
     if folded is not None and most is not None and most > folded:
         yield (*path, "max_range_rate"), f"at most {folded:g}, where range rates are folded", describe(most)
+    if clutter.kind == "measurement_space":
+        yield from _box_findings(measurement, clutter.low, clutter.high, path)
 
 
-def clutter_box_findings(measurement: Measurement, clutter: Clutter, path: Path) -> Iterator[Finding]:
+def _box_findings(
+    measurement: Measurement, low: Sequence[float], high: Sequence[float], path: Path
+) -> Iterator[Finding]:
     """Yield faults if the bounds of clutter in measurement space are not a box of the measurement's components."""
-    if clutter.kind != "measurement_space":
-        return
-    low, high, (dim, angular) = clutter.low, clutter.high, components(measurement)
+    dim, angular = components(measurement)
     for name, values in (("low", low), ("high", high)):
         if dim is not None and len(values) != dim:
             yield (*path, name), _components(measurement, dim), describe(values)

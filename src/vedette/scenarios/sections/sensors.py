@@ -32,7 +32,6 @@ from vedette.scenarios.sections.sensing import (
     Detection,
     Measurement,
     Noise,
-    clutter_box_findings,
     clutter_findings,
     noise_findings,
 )
@@ -248,7 +247,6 @@ class Sensor(Section):
 
     _noise_fits = check(lambda self: noise_findings(self.measurement, self.noise, ("noise",)))
     _clutter_is_measured = check(lambda self: clutter_findings(self.measurement, self.clutter, ("clutter",)))
-    _clutter_is_a_box = check(lambda self: clutter_box_findings(self.measurement, self.clutter, ("clutter",)))
 
     @check
     def _bias_is_of_what_is_measured(self) -> Iterator[Finding]:

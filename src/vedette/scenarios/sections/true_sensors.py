@@ -19,7 +19,6 @@ from vedette.scenarios.sections.sensing import (
     Detection,
     Measurement,
     Noise,
-    clutter_box_findings,
     clutter_findings,
     noise_findings,
     same_measurement_findings,
@@ -115,7 +114,6 @@ class TrueSensor(Section):
             yield from noise_findings(measurement, self.noise, ("true_parameters", "noise"))
         if self.clutter is not None:
             yield from clutter_findings(measurement, self.clutter, ("true_parameters", "clutter"))
-            yield from clutter_box_findings(measurement, self.clutter, ("true_parameters", "clutter"))
         if self.detection_of == "measurement" and measurement.kind not in (*PLACED, "custom"):
             wanted = f"state, as a {measurement.kind} measurement does not say where the target is"
             yield ("true_parameters", "detection_of"), wanted, describe(self.detection_of)
