@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import ArrayLike
 
@@ -32,6 +34,15 @@ def places_of(scan: ScanLike, pose: Floats, kind: str) -> Floats:
     bearings = measured[:, 0]
     away = measured[:, 1:2] * np.column_stack([np.cos(bearings), np.sin(bearings)])
     return np.asarray(own_places(bearings, pose) + away)
+
+
+def place_stds(kind: str, stds: Sequence[float] | Floats, scan: Floats) -> Floats:
+    """Return the larger standard deviation of each measured place, shape (num,), m; empty if it measures no places."""
+    if kind not in PLACED:
+        return np.empty(0)
+    if is_position(kind):
+        return np.full(len(scan), max(stds[:2]))
+    return np.asarray(np.maximum(stds[1], stds[0] * scan[:, 1]))
 
 
 def box_of(places: Floats, share: float = MARGIN) -> Floats:

@@ -14,7 +14,7 @@ from scipy.special import gammaln, xlogy
 from vedette.internal.quantities import PLACED
 from vedette.kernels.base.types import Floats, Ints
 from vedette.models.scan_rows import values_of
-from vedette.recorded.extents import places_of
+from vedette.recorded.extents import place_stds, places_of
 from vedette.recorded.scan_times import RecordedScans, RecordedSensor
 
 _SURE = 20.0  # log likelihood ratio of a learnt extent; independent chance values reach about 10
@@ -137,10 +137,7 @@ def placed_scans(recording: RecordedScans, s: int, site: RecordedSensor, model: 
         if (scan := instant[s]) is None:
             continue
         places = places_of(scan, recording.poses[k, s], site.kind)
-        stds = np.full(len(scan), 0.0)
-        if model.stds is not None:
-            across = values_of(scan)[:, 1] * model.stds[0] if site.kind.startswith("bearing") else model.stds[0]
-            stds = np.maximum(across, model.stds[1]) + stds
+        stds = np.zeros(len(scan)) if model.stds is None else place_stds(site.kind, model.stds, values_of(scan))
         found.append(PlacedScan(time, places, stds, recording.poses[k, s, :2]))
     return found
 

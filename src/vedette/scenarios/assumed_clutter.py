@@ -9,11 +9,11 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from vedette.internal.quantities import COMPONENTS, PLACED, is_position
+from vedette.internal.quantities import COMPONENTS, PLACED
 from vedette.kernels.base.types import Floats
 from vedette.models.scan_rows import values_of
 from vedette.recorded import RecordedScans
-from vedette.recorded.extents import places_of
+from vedette.recorded.extents import place_stds, places_of
 from vedette.scenarios.sections import ScenarioModel
 from vedette.scenarios.sections.sensing import Measurement
 
@@ -93,15 +93,6 @@ def _terms(scan: PlacedScan, tree: Any, max_motion: float, max_radius: float) ->
     )
     prob_alone = (1.0 - 1.0 / (_RING_FACTOR**2 - 1.0)) ** (num_in_ring - num_near)
     return np.array([(num_near > 0) - 1.0 + prob_alone, prob_alone]) * (_RING_FACTOR * radii <= max_radius)
-
-
-def place_stds(kind: str, stds: Floats, scan: Floats) -> Floats:
-    """Return the larger standard deviation of each measured place, shape (num,), m; empty if it measures no places."""
-    if kind not in PLACED:
-        return np.empty(0)
-    if is_position(kind):
-        return np.full(len(scan), stds[:2].max())
-    return np.asarray(np.maximum(stds[1], stds[0] * scan[:, 1]))
 
 
 def assumed_clutter(

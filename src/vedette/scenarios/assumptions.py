@@ -14,7 +14,8 @@ from vedette.kernels.base.types import TURN_RATE, Floats
 from vedette.models.heights import ASSUMED_HEIGHT
 from vedette.models.turns import is_turn
 from vedette.recorded import RecordedScans
-from vedette.scenarios.assumed_clutter import assumed_clutter, place_stds
+from vedette.recorded.extents import place_stds
+from vedette.scenarios.assumed_clutter import assumed_clutter
 from vedette.scenarios.region import describe_region, measured_region
 from vedette.scenarios.sections import ScenarioModel
 from vedette.scenarios.sections.undetected_intensity import has_intensity
