@@ -99,8 +99,11 @@ def test_a_hole_may_be_entered_and_its_edge_not_crossed() -> None:
         ([1, 2], "no GeoJSON: type nothing"),
         ({"type": "Point", "coordinates": [0, 0]}, "no polygon in it"),
         ({"type": "Polygon", "coordinates": [[[0, 0], [1, 1]]]}, "a ring of 2 corners, or not closed"),
-        ({"type": "Polygon", "coordinates": [[["a", 0]]]}, r"a ring whose corners are not \[longitude, latitude\]"),
-        ({"type": "Polygon", "coordinates": [[[0, 0], [500, 0], [0, 1], [0, 0]]]}, "corners that are no degrees"),
+        (
+            {"type": "Polygon", "coordinates": [[["a", 0]]]},
+            r"a ring whose places are not several \[longitude, latitude\]",
+        ),
+        ({"type": "Polygon", "coordinates": [[[0, 0], [500, 0], [0, 1], [0, 0]]]}, "places that are no degrees"),
         ({"type": "Polygon", "coordinates": [[[170, 0], [171, 0], [170, 1], [170, 0]]]}, "side of the globe"),
     ],
 )

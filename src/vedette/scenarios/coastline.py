@@ -13,7 +13,7 @@ import numpy as np
 from vedette.errors import InputError
 from vedette.kernels.base.types import Bools, Floats
 from vedette.scenarios.diagnostics import Finding, Path, describe
-from vedette.scenarios.geojson import as_list, geometries
+from vedette.scenarios.geojson import as_list, degrees_of, geometries
 from vedette.scenarios.sections import ScenarioModel
 
 if TYPE_CHECKING:  # importing it imports the filters, which a check does not need
@@ -57,7 +57,7 @@ def _read(
     raw_lines = [line for geometry in geometries(name, folder) for line in _lines(geometry)]
     if not raw_lines:
         raise InputError(f"{describe(name)}: no line and no polygon in it")
-    lines = [part for line in raw_lines for part in _in_plane(_degrees(line, name), origin)]
+    lines = [part for line in raw_lines for part in _in_plane(degrees_of(line, name, "a line"), origin)]
     lines = [part for line in lines for part in _retained_parts(line, _meets_box(line, low, high))]
     spacing = _MIN_SPACING * float((high - low).max())
     while (
@@ -75,19 +75,6 @@ def _lines(geometry: Any) -> list[Any]:
     if geometry["type"] == "MultiPolygon":
         return [ring for polygon in coordinates for ring in as_list(polygon)]
     return several.get(geometry["type"], [])
-
-
-def _degrees(line: Any, name: str) -> Floats:
-    """Longitudes and latitudes, shape (n, 2)."""
-    try:
-        degrees = np.array([[float(place[0]), float(place[1])] for place in line], np.float64).reshape(-1, 2)
-    except (TypeError, ValueError, IndexError, KeyError):
-        degrees = np.empty((0, 2))
-    if len(degrees) < 2:
-        raise InputError(f"{describe(name)}: a line whose places are not several [longitude, latitude]")
-    if not (np.abs(degrees) <= [360.0, 90.0]).all():  # also False for NaN
-        raise InputError(f"{describe(name)}: places that are no degrees of longitude and latitude")
-    return degrees
 
 
 def _in_plane(degrees: Floats, origin: Origin) -> Iterator[Floats]:

@@ -7,8 +7,11 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path as FilePath
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from vedette.errors import InputError
 from vedette.internal.reading import parse_json, read_text
+from vedette.kernels.base.types import Floats
 from vedette.scenarios.diagnostics import Diagnostic, Path, describe
 from vedette.scenarios.sections.places import read_origin
 
@@ -116,13 +119,21 @@ def _geometries_in(content: Any, name: str) -> Iterator[Mapping[str, Any]]:
 
 def _in_metres(ring: Any, origin: Origin, name: str) -> Ring:
     """Return a ring in metres, without its last corner, which repeats the first."""
-    try:
-        degrees = [(float(corner[0]), float(corner[1])) for corner in ring]
-    except (TypeError, ValueError, IndexError, KeyError):
-        raise InputError(f"{describe(name)}: a ring whose corners are not [longitude, latitude]") from None
-    if len(degrees) < 4 or degrees[0] != degrees[-1]:
+    degrees = degrees_of(ring, name, "a ring")
+    if len(degrees) < 4 or (degrees[0] != degrees[-1]).any():
         raise InputError(f"{describe(name)}: a ring of {len(degrees)} corners, or not closed")
-    if any(abs(lon) > 360.0 or abs(lat) > 90.0 for lon, lat in degrees):
-        raise InputError(f"{describe(name)}: corners that are no degrees of longitude and latitude")
-    corners: Ring = origin.to_plane([lon for lon, _ in degrees[:-1]], [lat for _, lat in degrees[:-1]]).tolist()
+    corners: Ring = origin.to_plane(*degrees[:-1].T).tolist()
     return corners
+
+
+def degrees_of(places: Any, name: str, kind: str) -> Floats:
+    """Return longitudes and latitudes, shape (n, 2), of a line or ring, called `kind` in messages."""
+    try:
+        degrees = np.array([[float(place[0]), float(place[1])] for place in places], np.float64).reshape(-1, 2)
+    except (TypeError, ValueError, IndexError, KeyError):
+        degrees = np.empty((0, 2))
+    if len(degrees) < 2:
+        raise InputError(f"{describe(name)}: {kind} whose places are not several [longitude, latitude]")
+    if not (np.abs(degrees) <= [360.0, 90.0]).all():  # also False for NaN
+        raise InputError(f"{describe(name)}: places that are no degrees of longitude and latitude")
+    return degrees
