@@ -8,7 +8,8 @@ from typing import Any
 
 from vedette.errors import InputError
 from vedette.internal.extras import require_packages
-from vedette.internal.text import elided, printable
+from vedette.internal.reading import error_summary
+from vedette.internal.text import printable
 
 BAG_ENDINGS = (".db3", ".mcap")
 _POSES, _POINT, _FIX = "geometry_msgs/msg/PoseArray", "geometry_msgs/msg/PointStamped", "sensor_msgs/msg/NavSatFix"
@@ -36,7 +37,7 @@ def read_bag(file: Path, *, reports: bool) -> tuple[dict[str, list[Any]], list[i
             for place in _places(message):
                 rows.append((number, stamp.sec + 1e-9 * stamp.nanosec, topic, place))
     except Exception as error:  # a damaged bag may raise any error in the packages that read it
-        reason = elided(printable(" ".join(str(error).split())), 200)
+        reason = printable(error_summary(error))
         raise InputError(
             f"{file}: expected a ROS 2 bag; it cannot be read: {type(error).__name__}: {reason}"
         ) from error

@@ -12,6 +12,7 @@ from pathlib import Path
 
 from vedette.errors import InputError
 from vedette.internal.extras import require_packages
+from vedette.internal.reading import error_summary
 from vedette.internal.text import elided, printable
 from vedette.recorded.ais import AIS_ENDINGS, read_ais
 from vedette.recorded.asterix import ASTERIX_ENDINGS, CAPTURE_ENDINGS, read_asterix
@@ -68,7 +69,7 @@ def _content(file: Path) -> tuple[bytes, str]:
                 return content, hashlib.sha256(content).hexdigest()
             return b"", hashlib.file_digest(source, "sha256").hexdigest()
     except OSError as error:
-        raise InputError(f"{file}: cannot be read: {_reason(error)}") from error
+        raise InputError(f"{file}: cannot be read: {printable(error_summary(error))}") from error
 
 
 def _parsed(file: Path, content: bytes, reports: bool) -> Table:
@@ -91,7 +92,7 @@ def _csv(file: Path, content: bytes) -> Table:
         header = header_of(reader, file)
         rows = [(reader.line_num, cells) for cells in reader if cells]
     except (UnicodeDecodeError, csv.Error) as error:
-        raise InputError(f"{file}: cannot be read as CSV in UTF-8: {_reason(error)}") from error
+        raise InputError(f"{file}: cannot be read as CSV in UTF-8: {printable(error_summary(error))}") from error
     if len(set(header)) != len(header):
         raise InputError(f"{file}, row 1: expected each column name once; got {column_names(header)}")
     for line, cells in rows:
@@ -124,10 +125,5 @@ def _parquet(file: Path, content: bytes) -> Table:
     except InputError:
         raise
     except (OSError, ValueError, KeyError, OverflowError, ArrowException) as error:
-        raise InputError(f"{file}: cannot be read as Parquet: {_reason(error)}") from error
+        raise InputError(f"{file}: cannot be read as Parquet: {printable(error_summary(error))}") from error
     return Table(columns, range(1, table.num_rows + 1), str(file))
-
-
-def _reason(error: Exception) -> str:
-    """Return the error message of another library, on one line."""
-    return elided(printable(" ".join(str(error).split())), 300)
