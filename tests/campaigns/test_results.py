@@ -223,7 +223,7 @@ def test_what_is_no_results_folder_is_named(folder, tmp_path):
         ),
         ({"seed": 8}, r"campaign\.sqlite: expected the runs of the manifest beside it"),
         ({"cells": []}, "the manifest was altered"),
-        ({"digest": None}, "expected a field digest"),
+        ({"digest": None}, "altered: digest: Field required"),
     ],
 )
 def test_an_altered_manifest_is_named(folder, change, message):
