@@ -14,7 +14,6 @@ from pathlib import Path as FilePath
 import numpy as np
 
 from vedette.errors import InputError
-from vedette.internal.extras import is_installed
 from vedette.internal.text import elided, printable
 from vedette.scenarios.diagnostics import Finding, Path, describe, shown_key
 from vedette.scenarios.recorded_data import recorded_targets
@@ -121,6 +120,8 @@ def reference_findings(model: ScenarioModel, folder: FilePath) -> Iterator[Findi
 
 
 def _reference_findings(path: Path, custom: Custom, folder: FilePath) -> Iterator[Finding]:
+    from vedette.internal.extras import is_installed  # here, as most scenarios name no code
+
     module, _, name = custom.function.rpartition(":")
     if module.endswith(".py"):
         if not os.path.isfile(folder / module):
