@@ -9,6 +9,7 @@ import matplotlib
 import pytest
 from hypothesis import HealthCheck, settings
 
+from empty_figures import print_empty
 from reports.browser import Browser, chromium
 
 matplotlib.use("Agg")
@@ -27,6 +28,14 @@ def browser() -> Iterator[Browser]:
     assert program is not None
     with Browser(program) as running:
         yield running
+
+
+@pytest.fixture
+def quick_figures() -> Iterator[None]:
+    """Write files of figures without their contents, for tests of commands whose figures other tests draw."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("vedette.evaluation.figures.style._print", print_empty)
+        yield
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
