@@ -9,7 +9,7 @@ import matplotlib
 import pytest
 from hypothesis import HealthCheck, settings
 
-from empty_figures import print_empty
+from empty_figures import print_nothing, print_svg
 from reports.browser import Browser, chromium
 
 matplotlib.use("Agg")
@@ -34,7 +34,15 @@ def browser() -> Iterator[Browser]:
 def quick_figures() -> Iterator[None]:
     """Write files of figures without their contents, for tests of commands whose figures other tests draw."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("vedette.evaluation.figures.style._print", print_empty)
+        print_nothing(patch)
+        yield
+
+
+@pytest.fixture
+def svg_figures() -> Iterator[None]:
+    """Draw figures as SVG alone, for tests of what is drawn: the other formats take most of the time, and draw that."""
+    with pytest.MonkeyPatch.context() as patch:
+        print_svg(patch)
         yield
 
 

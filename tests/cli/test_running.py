@@ -7,7 +7,7 @@ import shutil
 import pytest
 from typer.testing import CliRunner
 
-from empty_figures import print_empty
+from empty_figures import print_nothing
 from short_runs import short_paper_e
 from vedette.campaigns import open_results
 from vedette.cli import app, running
@@ -150,7 +150,7 @@ def test_reproduce(scenario_file, tmp_path, monkeypatch):
     assert [results.finished(cell) for cell in ("idm", "stationary")] == [(0, 1), (0, 1)]
     for name in ("report.html", "summary.md", "summary.csv", "figures/ospa.pdf", "tables/scans.parquet"):
         assert (out / name).stat().st_size > 100
-    monkeypatch.setattr("vedette.evaluation.figures.style._print", print_empty)  # the figures have just been drawn
+    print_nothing(monkeypatch)  # the figures have just been drawn
     again = call("reproduce", scenario_file, "--runs", 2, "--planners", "idm,stationary", "--workers", 1, "--out", out)
     assert again.exit_code == 0, again.output
     other = call("reproduce", scenario_file, "--runs", 2, "--planners", "stationary", "--workers", 1, "--out", out)

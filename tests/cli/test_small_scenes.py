@@ -7,9 +7,7 @@ from pathlib import Path
 import pytest
 from typer.testing import CliRunner
 
-from empty_figures import print_empty
 from vedette.cli import app
-from vedette.evaluation.figures import style
 from vedette.simulation.storage import load_run
 
 SCENE = """\
@@ -105,12 +103,8 @@ TELLING = (
     [name if name in TELLING else pytest.param(name, marks=pytest.mark.slow) for name in CHANGES],
     indirect=True,
 )
-def test_a_campaign_of_one_run_is_reported_and_exported(
-    scene: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """The contents of every figure are drawn twice, on the page and as a file; the other formats draw the same."""
-    printed = style._print
-    monkeypatch.setattr(style, "_print", lambda *given: (printed if given[2] == "svg" else print_empty)(*given))
+@pytest.mark.usefixtures("svg_figures")
+def test_a_campaign_of_one_run_is_reported_and_exported(scene: Path, tmp_path: Path) -> None:
     spec, folder = tmp_path / "spec.toml", tmp_path / "results"
     planners = '["idm", "stationary"]' if "phd" not in scene.read_text() else '["random", "stationary"]'
     spec.write_text(f'name = "small"\nscenarios = ["{scene.name}"]\nplanners = {planners}\nruns = 1\n')
