@@ -9,6 +9,7 @@ import matplotlib
 import pytest
 from hypothesis import HealthCheck, settings
 
+from empty_figures import print_nothing, print_svg
 from reports.browser import Browser, chromium
 
 matplotlib.use("Agg")
@@ -27,6 +28,22 @@ def browser() -> Iterator[Browser]:
     assert program is not None
     with Browser(program) as running:
         yield running
+
+
+@pytest.fixture
+def quick_figures() -> Iterator[None]:
+    """Write files of figures without their contents, for tests of commands whose figures other tests draw."""
+    with pytest.MonkeyPatch.context() as patch:
+        print_nothing(patch)
+        yield
+
+
+@pytest.fixture
+def svg_figures() -> Iterator[None]:
+    """Draw figures as SVG alone, for tests of what is drawn: the other formats take most of the time, and draw that."""
+    with pytest.MonkeyPatch.context() as patch:
+        print_svg(patch)
+        yield
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:

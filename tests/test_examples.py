@@ -41,8 +41,8 @@ SCRIPTS = [
 
 
 def results_folder(place: Path) -> None:
-    """What the pages on results and reports begin with: a folder `results` from a campaign."""
-    fill(place / "results", make_campaign())
+    """What the page on reports begins with: a folder `results` from a campaign of one group of strategies."""
+    fill(place / "results", make_campaign(grid={}))
 
 
 def tables_folder(place: Path) -> None:

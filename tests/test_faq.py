@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import re
 import shutil
 import subprocess
@@ -9,8 +10,10 @@ import sys
 from pathlib import Path
 
 import pytest
+from typer.testing import CliRunner
 
 from scripts import ROOT
+from vedette.cli import app
 from vedette.scenarios import json_schema
 from waiting import PATIENCE
 
@@ -20,13 +23,17 @@ COMMANDS = re.findall(r"^vedette .*$", PAGE, re.MULTILINE)
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Where all commands were run."""
+    """Where all commands were run: the first one as a program, and the others in this process."""
     place = tmp_path_factory.mktemp("clone")
     shutil.copytree(ROOT / "examples", place / "examples")
-    for command in COMMANDS:
-        program = [str(Path(sys.executable).with_name("vedette")), *command.split()[1:]]
-        result = subprocess.run(program, cwd=place, capture_output=True, text=True, timeout=PATIENCE, check=False)
-        assert result.returncode == 0, command + "\n" + result.stdout + result.stderr
+    first, *others = (command.split()[1:] for command in COMMANDS)
+    program = [str(Path(sys.executable).with_name("vedette")), *first]
+    done = subprocess.run(program, cwd=place, capture_output=True, text=True, timeout=PATIENCE, check=False)
+    assert done.returncode == 0, done.stdout + done.stderr
+    with contextlib.chdir(place):
+        for words in others:
+            result = CliRunner().invoke(app, words)
+            assert result.exit_code == 0, " ".join(words) + "\n" + result.output
     return place
 
 

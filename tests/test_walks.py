@@ -102,8 +102,12 @@ def test_a_decision_takes_few_files(walks: dict[str, Counter[str]]) -> None:
     assert len(walks["decision"]) <= 54
 
 
+@pytest.mark.usefixtures("quick_figures")
 def test_a_run_from_the_command_line_takes_few_calls(tmp_path: Path) -> None:
-    """The second one in a process, which writes its folder and figures; more than half are of tracking and planning."""
+    """The second one in a process, which writes its folder and figures; more than half are of tracking and planning.
+
+    The figures are made but not drawn, as the calls counted are those of the library, and drawing is Matplotlib's.
+    """
     words = ["run", "paper-a", "--threads", "1", "--out", str(tmp_path / "run"), "--overwrite"]
     assert CliRunner().invoke(app, words).exit_code == 0
     calls = calls_of(lambda: CliRunner().invoke(app, words))

@@ -47,8 +47,8 @@ PROGRAM = [sys.executable, "-c", "from vedette.cli import app; app(prog_name='ve
 
 def test_a_killed_loop_resumes_and_its_record_replays_to_the_same_bytes(place: Path) -> None:
     lines = walk(10)
-    words = [*PROGRAM, *WORDS, "--decide-every", "4", "--planner", "idm"]
-    kept = [*words, "--snapshot", "state", "--snapshot-interval", "0", "--record", "came"]
+    options = ("--decide-every", "4", "--planner", "idm")
+    kept = [*PROGRAM, *WORDS, *options, "--snapshot", "state", "--snapshot-interval", "0", "--record", "came"]
     with subprocess.Popen(kept, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL) as process:
         assert process.stdin is not None
         assert process.stdout is not None
@@ -60,13 +60,12 @@ def test_a_killed_loop_resumes_and_its_record_replays_to_the_same_bytes(place: P
     assert num in (8, 9)
     rest = b"\n".join(lines[num:])
     second = subprocess.run(kept, input=rest, capture_output=True, timeout=WAIT, check=True)
-    whole = subprocess.run(words, input=b"\n".join(lines), capture_output=True, timeout=WAIT, check=True)
+    whole = call(*options, lines=lines)
     both = list(dict.fromkeys([*first, *second.stdout.splitlines(keepends=True)]))
-    wanted = whole.stdout.splitlines(keepends=True)
+    wanted = whole.stdout_bytes.splitlines(keepends=True)
     assert [text for text in wanted if text not in both] in ([], wanted[8:9])
     assert both[-1] == wanted[-1]
-    replayed = subprocess.run(words, input=(place / "came").read_bytes(), capture_output=True, timeout=WAIT, check=True)
-    assert replayed.stdout == whole.stdout
+    assert call(*options, lines=(place / "came").read_bytes().splitlines()).stdout_bytes == whole.stdout_bytes
     assert os.listdir(place).count("state") == 1
 
 

@@ -8,12 +8,14 @@ from pathlib import Path
 from typing import IO, Any
 
 import pytest
+from typer.testing import CliRunner
 from websockets.sync.client import connect
 
 from cli.test_live import PROGRAM, WAIT, WORDS
 from live.examples import SYNCHRONOUS, line, walk
 from reports.browser import Browser, Page, chromium
 from reports.test_browser import ink, state, text, wait_until
+from vedette.cli import app
 
 CHROMIUM = chromium()
 pytestmark = pytest.mark.skipif(CHROMIUM is None, reason="no chromium or chrome on PATH to open the page in")
@@ -79,7 +81,9 @@ def test_dates_are_its_clock(browser: Browser, folder: Path) -> None:
         loop.kill()
 
 
-def test_the_page_draws_scans_and_survives_a_kill(browser: Browser, folder: Path) -> None:
+def test_the_page_draws_scans_and_survives_a_kill(
+    browser: Browser, folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     loop, lines = Loop(folder), walk(12)
     try:
         page = browser.open(loop.page, width=1400)
@@ -118,11 +122,11 @@ def test_the_page_draws_scans_and_survives_a_kill(browser: Browser, folder: Path
         assert int(page.evaluate("document.querySelector('[data-part=scrubber]').max")) >= 3  # what was drawn is kept
     finally:
         loop.kill()
-    words = [*PROGRAM, *WORDS, *OPTIONS]
     came = (folder / "came").read_bytes()
     assert came.splitlines() == [*lines[:12], line(1, "never"), *lines[12:]]
-    first, again = (subprocess.run(words, input=came, cwd=folder, capture_output=True, timeout=WAIT) for _ in range(2))
-    assert first.stdout == again.stdout
+    monkeypatch.chdir(folder)
+    first, again = (CliRunner().invoke(app, [*WORDS, *OPTIONS], input=came) for _ in range(2))
+    assert first.stdout_bytes == again.stdout_bytes
     assert json.loads(first.stdout.splitlines()[-1])["time"] == 11.0
 
 

@@ -92,6 +92,7 @@ def test_every_command_has_both_options() -> None:
         assert {"--json", "--quiet", "-q"} <= {option for each in command.params for option in each.opts}
 
 
+@pytest.mark.usefixtures("quick_figures")
 def test_json_is_one_document_and_quiet_is_silence(place: Path) -> None:
     for words, keys in CALLS:
         result = call(*words, "--json")
@@ -172,6 +173,7 @@ def test_the_overwrite_option_is_suggested_and_works(place: Path, words: tuple[s
     assert call(*words, "--force").exit_code == 0  # its name of before
 
 
+@pytest.mark.usefixtures("quick_figures")
 def test_a_run_names_it_too(place: Path) -> None:
     words = ("run", "short.yaml", "--planner", "stationary", "--out", "run")
     assert call(*words).exit_code == 0
@@ -199,6 +201,12 @@ def test_completion_lists_available_names(place: Path) -> None:
     assert completing.scenarios("nowhere/") == []
 
 
+def completion(*words: str) -> dict[str, str]:
+    """Return what a shell sets in the environment to complete the last of `words`."""
+    line = " ".join(("vedette", *words))
+    return {"_VEDETTE_COMPLETE": "complete_bash", "COMP_WORDS": line, "COMP_CWORD": str(len(words))}
+
+
 @pytest.mark.parametrize(
     ("words", "expected"),
     [
@@ -218,17 +226,22 @@ def test_completion_lists_available_names(place: Path) -> None:
     ids=lambda each: " ".join(each),
 )
 def test_shell_completion_lists_names(place: Path, words: tuple[str, ...], expected: list[str]) -> None:
-    environment = {"_VEDETTE_COMPLETE": "complete_bash", "COMP_WORDS": " ".join(("vedette", *words))}
+    result = CliRunner().invoke(app, [], prog_name="vedette", env=completion(*words))
+    assert result.stderr == ""
+    assert result.stdout.split() == expected
+
+
+def test_the_program_answers_a_shell(place: Path) -> None:
     done = subprocess.run(
         [sys.executable, "-c", "from vedette.cli import app; app(prog_name='vedette')"],
-        env={**os.environ, **environment, "COMP_CWORD": str(len(words))},
+        env={**os.environ, **completion("run", "short.yaml", "--planner", "o")},
         capture_output=True,
         text=True,
         timeout=WAIT,
         check=False,
     )
     assert done.stderr == ""
-    assert done.stdout.split() == expected
+    assert done.stdout.split() == ["oracle", "own"]
 
 
 def test_a_misspelled_option_suggests_the_right_one() -> None:

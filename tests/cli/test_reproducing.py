@@ -124,6 +124,7 @@ def test_a_campaign_may_be_one_that_comes_with_the_library(name: str) -> None:
     assert result.stdout.startswith(f"{name}: ")
 
 
+@pytest.mark.usefixtures("quick_figures")
 def test_the_paper_is_compared_with_the_default_and_its_claims_are_checked(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:

@@ -7,6 +7,7 @@ import shutil
 import pytest
 from typer.testing import CliRunner
 
+from empty_figures import print_nothing
 from short_runs import short_paper_e
 from vedette.campaigns import open_results
 from vedette.cli import app, running
@@ -58,6 +59,7 @@ def fail_at(monkeypatch, step, error):
     ("error", "status", "said"),
     [(NumericalError("no weight"), 1, "no weight"), (KeyboardInterrupt(), 130, "interrupted")],
 )
+@pytest.mark.usefixtures("quick_figures")
 def test_an_interrupted_run_keeps_its_scans(scenario_file, tmp_path, monkeypatch, error, status, said):
     out = tmp_path / "results"
     fail_at(monkeypatch, 9, error)
@@ -82,6 +84,7 @@ def test_an_interrupted_run_keeps_its_scans(scenario_file, tmp_path, monkeypatch
     assert load_run(out).num_scans == 10
 
 
+@pytest.mark.usefixtures("quick_figures")
 def test_ctrl_c_during_figures_reports_that_the_run_is_saved(scenario_file, tmp_path, monkeypatch):
     def interrupted(*_, **__):
         raise KeyboardInterrupt
@@ -98,6 +101,7 @@ def test_ctrl_c_during_figures_reports_that_the_run_is_saved(scenario_file, tmp_
     assert call("run", scenario_file, "--planner", "idm", "--out", tmp_path / "results").exit_code == 1
 
 
+@pytest.mark.usefixtures("quick_figures")
 def test_a_run_that_another_process_wrote_meanwhile_is_kept(scenario_file, tmp_path, monkeypatch):
     out, simulate = tmp_path / "results", running._simulate
 
@@ -137,7 +141,7 @@ def test_run_without_a_folder_writes_nothing(scenario_file, tmp_path):
     assert [path.name for path in tmp_path.iterdir()] == ["short.yaml"]
 
 
-def test_reproduce(scenario_file, tmp_path):
+def test_reproduce(scenario_file, tmp_path, monkeypatch):
     out = tmp_path / "all"
     result = call("reproduce", scenario_file, "--runs", 2, "--planners", "idm,stationary", "--workers", 1, "--out", out)
     assert result.exit_code == 0, result.output
@@ -146,6 +150,7 @@ def test_reproduce(scenario_file, tmp_path):
     assert [results.finished(cell) for cell in ("idm", "stationary")] == [(0, 1), (0, 1)]
     for name in ("report.html", "summary.md", "summary.csv", "figures/ospa.pdf", "tables/scans.parquet"):
         assert (out / name).stat().st_size > 100
+    print_nothing(monkeypatch)  # the figures have just been drawn
     again = call("reproduce", scenario_file, "--runs", 2, "--planners", "idm,stationary", "--workers", 1, "--out", out)
     assert again.exit_code == 0, again.output
     other = call("reproduce", scenario_file, "--runs", 2, "--planners", "stationary", "--workers", 1, "--out", out)

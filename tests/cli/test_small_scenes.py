@@ -103,6 +103,7 @@ TELLING = (
     [name if name in TELLING else pytest.param(name, marks=pytest.mark.slow) for name in CHANGES],
     indirect=True,
 )
+@pytest.mark.usefixtures("svg_figures")
 def test_a_campaign_of_one_run_is_reported_and_exported(scene: Path, tmp_path: Path) -> None:
     spec, folder = tmp_path / "spec.toml", tmp_path / "results"
     planners = '["idm", "stationary"]' if "phd" not in scene.read_text() else '["random", "stationary"]'

@@ -123,6 +123,7 @@ def test_a_new_metric_of_a_scenario_continues_the_campaign(tmp_path: Path) -> No
     assert "farthest_m" in parquet.read_schema(folder / "tables" / "scans.parquet").names
 
 
+@pytest.mark.usefixtures("quick_figures")
 def test_tables_comparisons_and_reports_have_its_column(tmp_path: Path) -> None:
     folder = fill(tmp_path / "results", make_campaign(grid={}))
     results = open_results(folder, metrics=OWN)

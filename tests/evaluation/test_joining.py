@@ -10,12 +10,13 @@ import numpy as np
 import pytest
 from scipy.optimize import linear_sum_assignment
 
+from evaluation.synthetic import make_record
 from vedette import models
 from vedette.densities import Estimate, track_histories
 from vedette.errors import InputError
 from vedette.evaluation import gaps
 from vedette.evaluation.gaps import gap_log_ratios
-from vedette.evaluation.joining import find_joins, track_names
+from vedette.evaluation.joining import Join, find_joins, track_names, with_joined_tracks
 from vedette.evaluation.observation_history import ObservationHistory, birth_count_ratio
 
 DT, SURVIVAL, DETECTION, SIGMA, NOISE = 2.0, 0.97, 0.8, 0.6, 3.0
@@ -147,6 +148,63 @@ def test_scans_that_did_not_take_place_miss_nothing() -> None:
     assert ratio > most + log_seen  # of no scan the hypothesis that the target died is no more probable
 
 
+def test_a_sensor_that_is_too_far_away_misses_nothing() -> None:
+    """A target without detections while the sensor is out of range is as one without scans."""
+    estimates, *_ = scene()
+    sensor = models.SensorModel(
+        models.position(),
+        models.constant_noise([NOISE, NOISE]),
+        models.limited_range(DETECTION, 500.0),
+        models.region_clutter(1.0, models.Region(-1e3, 1e3, -1e3, 1e3), "position"),
+    )
+    poses, scanned = np.zeros((ENDS, 1, 3)), np.ones((ENDS, 1), np.bool_)
+    poses[LAST : BEGINS - 1, 0, 0] = 1e5
+    scanned[LAST : BEGINS - 1] = False
+    near = make_observations(0.0, sensors=(sensor,))
+    far, blind = (replace(near, poses=poses), replace(near, scanned=scanned))
+    ratio, away, without = (dense(estimates, observations)[0, 1] for observations in (near, far, blind))
+    assert away == pytest.approx(without)
+    assert away > ratio + 1.0
+
+
+def test_earlier_estimates_of_an_ended_label_do_not_count() -> None:
+    estimates, _, (mean, cov), _ = scene()
+    observations = make_observations(0.5)
+    expected = dense(estimates, observations)[0, 1]
+    sure = Estimate(np.array([[1, 0]]), mean[np.newaxis] - 1.0, 2.0 * cov[np.newaxis], np.array([0.999]))
+    assert dense([sure, *estimates[1:]], observations)[0, 1] == expected
+
+
+@pytest.mark.parametrize(("gap", "num_joins"), [(150, 1), (250, 0)])
+def test_a_label_continues_after_many_scans_but_not_after_more_than_200(gap: int, num_joins: int) -> None:
+    """A target that is known to stand still, far from where targets are born."""
+    state, cov = np.array([-150.0, 0.0, 0.0, 0.0]), np.diag([4.0, 4.0, 1e-6, 1e-6])
+    seen = [Estimate(np.array([[label, 0]]), state[np.newaxis], cov[np.newaxis], np.ones(1)) for label in (1, 2)]
+    estimates = [seen[0], *[Estimate.empty(4)] * (gap - 1), seen[1]]
+    observations = make_observations(
+        1.0,
+        poses=np.zeros((gap + 1, 1, 3)),
+        scanned=np.ones((gap + 1, 1), np.bool_),
+        times=DT * np.arange(gap + 1.0),
+        targets=targets_of(models.Region(-1e3, 1e3, -1e3, 1e3), 0.01, survival=1.0, sigma=1e-6),
+    )
+    assert len(find_joins(estimates, observations)) == num_joins
+
+
+def test_finished_scans_are_reported_from_one() -> None:
+    estimates, *_ = scene()
+    told = list[int]()
+    find_joins(estimates, make_observations(0.5), progress=told.append)
+    assert told == list(range(1, ENDS + 1))
+
+
+@pytest.mark.parametrize("threshold", [-0.1, 1.5])
+def test_a_threshold_that_is_no_probability_is_rejected(threshold: float) -> None:
+    estimates, *_ = scene()
+    with pytest.raises(InputError, match="threshold: expected"):
+        find_joins(estimates, make_observations(0.5), threshold=threshold)
+
+
 def test_one_of_two_ended_labels_continues() -> None:
     estimates, *_ = scene()
     first = estimates[LAST - 1]
@@ -205,9 +263,19 @@ def test_joins_are_those_of_whole_matrices(monkeypatch: pytest.MonkeyPatch) -> N
     assert max(numbers) > 2
 
 
-def test_tracks_are_named_by_their_first_label() -> None:
-    from vedette.evaluation.joining import Join
+def test_a_renamed_track_keeps_its_row_of_every_column() -> None:
+    rng, labels = np.random.default_rng(0), np.array([[2, 0], [3, 1], [7, 0]])
+    covs = np.stack([np.diag(each) for each in rng.uniform(1.0, 9.0, (3, 4))])
+    estimate = Estimate(labels, rng.normal(size=(3, 4)), covs, np.array([0.7, 0.8, 0.9]))
+    record = replace(make_record(), estimates=(estimate,))
+    (joined,) = with_joined_tracks(record, [Join((1, 0), (7, 0), 0.99)]).estimates
+    assert joined.labels.tolist() == [[1, 0], [2, 0], [3, 1]]
+    for column in ("means", "covs", "existence", "class_probs"):
+        np.testing.assert_array_equal(getattr(joined, column), getattr(estimate, column)[[2, 0, 1]])
+    joined.validate()
 
+
+def test_tracks_are_named_by_their_first_label() -> None:
     joins = (Join((1, 0), (7, 2), 0.9), Join((7, 2), (20, 0), 0.8), Join((3, 1), (9, 0), 0.7))
     assert track_names(joins) == {(7, 2): (1, 0), (20, 0): (1, 0), (9, 0): (3, 1)}
 
@@ -224,10 +292,17 @@ def test_invalid_observation_histories_are_rejected(changed: dict[str, Any], mes
         make_observations(changed.pop("hidden"), **changed)
 
 
-def targets_of(region: models.Region | None, expected: Any, period: float | None = None) -> models.TargetModel:
+def targets_of(
+    region: models.Region | None,
+    expected: Any,
+    period: float | None = None,
+    *,
+    survival: float = SURVIVAL,
+    sigma: float = SIGMA,
+) -> models.TargetModel:
     measured = models.MeasurementBirth(expected, 0.1, np.array([6.0, 6.0, 4.0, 4.0]), region)
     birth = replace(models.BirthModel.none(4), from_measurements=measured, period=period)
-    return models.TargetModel(models.constant_velocity(SIGMA), models.constant_survival(SURVIVAL), birth)
+    return models.TargetModel(models.constant_velocity(sigma), models.constant_survival(survival), birth)
 
 
 @pytest.mark.parametrize(

@@ -115,6 +115,7 @@ def refused(place: Path) -> Iterator[None]:
         assert place.parent.name in text or place.name in text, text
 
 
+@pytest.mark.usefixtures("svg_figures")
 def test_results_folders(originals: Originals, copies: Callable[[Path], Path], try_cases: Cases) -> None:
     def check(rng: np.random.Generator) -> None:
         folder = copies(originals.place / "results")

@@ -9,6 +9,7 @@ from typing import Any
 
 import pytest
 
+from empty_figures import print_nothing
 from reports.examples import campaign_of, results_of
 from vedette.campaigns.results import CampaignResults
 from vedette.errors import InputError
@@ -122,6 +123,7 @@ def test_a_campaign_without_any_run_has_a_report(tmp_path: Path) -> None:
     assert "There is no finished run to replay." in words
 
 
+@pytest.mark.usefixtures("quick_figures")
 def test_a_number_that_is_compared_is_named_and_swept(tmp_path: Path) -> None:
     axis = "sensors.*.clutter.rate"
     campaign = campaign_of(planners=["constant"], grid={axis: [5.0, 40.0]}, compare=axis)
@@ -133,6 +135,7 @@ def test_a_number_that_is_compared_is_named_and_swept(tmp_path: Path) -> None:
     assert "Run clutter rate 40, run 0 " in words
 
 
+@pytest.mark.usefixtures("quick_figures")
 def test_scenarios_are_groups_and_not_compared_with_one_another(tmp_path: Path) -> None:
     campaign = campaign_of(planners=["stationary"], scenarios=["paper-a", "paper-e"], runs=1)
     words = Words(page_of(results_of(tmp_path / "results", campaign), tmp_path)).words
@@ -140,6 +143,7 @@ def test_scenarios_are_groups_and_not_compared_with_one_another(tmp_path: Path) 
     assert "There is nothing to compare: one strategy each." in words
 
 
+@pytest.mark.usefixtures("quick_figures")
 def test_measures_of_labels_are_left_out_for_filters_that_have_none(tmp_path: Path) -> None:
     filters = ["delta_glmb", "phd"]
     campaign = campaign_of(planners=["stationary"], scenarios=["linear-10"], filters=filters, runs=1)
@@ -161,10 +165,9 @@ def test_a_large_page_omits_figures_and_runs_with_a_note(tmp_path: Path, monkeyp
 
 
 def test_figures_of_very_many_lines_are_drawn_in_dots_and_say_so(
-    results: CampaignResults, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    results: CampaignResults, page: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    small = page_of(results, tmp_path)
-    assert "<img" not in small
+    assert "<img" not in page
     monkeypatch.setattr(html, "MAX_DRAWING_BYTES", 60_000)
     page = page_of(results, tmp_path)
     images = re.findall(r'<img src="data:image/png;base64,([^"]+)"', page)
@@ -218,7 +221,9 @@ def test_the_specification_reads_back() -> None:
     assert tomllib.loads(spec_toml(spec)) == kept
 
 
-def test_long_names_stay_whole_in_the_table_of_errors_and_short_elsewhere(tmp_path: Path) -> None:
+def test_long_names_stay_whole_in_the_table_of_errors_and_short_elsewhere(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     long = "x" * 60
     campaign = campaign_of(planners=["constant"], variants=[{"name": long}, {"name": "y"}])
     results = results_of(tmp_path / "results", campaign)
@@ -227,6 +232,7 @@ def test_long_names_stay_whole_in_the_table_of_errors_and_short_elsewhere(tmp_pa
     assert f'<th scope="row">{long}</th>' in page
     assert f'<th scope="col" title="{long}">{short}</th>' in page
     assert f"<title>{long}</title>" in page
+    print_nothing(monkeypatch)  # the names of the files matter
     written = write_figures(results, tmp_path / "figures")
     assert max(len(path.name) for path in written) <= 80
     assert len({path.name for path in written}) == len(written)

@@ -227,9 +227,10 @@ print(json.dumps([local.assignment.sharpness, default, refused]))
 
 
 def test_an_association_method_is_one_file(tmp_path: Path) -> None:
+    """As plain Python, since compiling a filter with it takes a minute; `test_assignment.py` compiles such methods."""
     shutil.copytree(SRC / "vedette", tmp_path / "vedette", ignore=shutil.ignore_patterns("__pycache__"))
     (tmp_path / "vedette" / "filters" / "alone.py").write_text(METHOD, "utf-8")
-    own = {**os.environ, "PYTHONPATH": str(tmp_path)}
+    own = {**os.environ, "PYTHONPATH": str(tmp_path), "NUMBA_DISABLE_JIT": "1"}
     ran = subprocess.run([sys.executable, "-c", AFTER_METHOD], env=own, capture_output=True, text=True, check=False)
     assert ran.returncode == 0, ran.stderr
     sharpness, default, refused = json.loads(ran.stdout)

@@ -13,6 +13,7 @@ import pytest
 
 from recordings import ORIGIN, RADARS, SHIPS, silence, write_recording
 from vedette.errors import InputError, ScenarioError
+from vedette.evaluation import joining
 from vedette.evaluation.joining import joins_of_run, with_joined_tracks
 from vedette.evaluation.runs import measure_run, run_scenario
 from vedette.evaluation.scans import scan_table, scans_of_record
@@ -392,6 +393,19 @@ def test_a_ship_keeps_its_track_over_a_gap(folder: Path) -> None:
     write_tracks(folder / "tracks.geojson", tables[1])
     features = json.loads((folder / "tracks.geojson").read_text("utf-8"))["features"]
     assert sorted(len(each["properties"]["labels"]) for each in features)[-3:] == [2, 2, 2]
+    # A ship that no island can hide would not be missed for half a minute.
+    assert joins_of_run(record, made.scenario, prob_hidden=0.0) == ()
+
+
+def test_joins_count_the_scans_that_took_place(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Radars of periods of their own, of which one scans at most instants."""
+    made = scenario_from_recording(folder / "radars.yaml", folder / "scans.csv", folder / "truth.csv")
+    given = list[Any]()
+    monkeypatch.setattr(joining, "find_joins", lambda *words, **_: given.extend(words))
+    joins_of_run(run_scenario(made.scenario, "stationary", seed=0), made.scenario)
+    scanned = np.array([[scan is not None for scan in instant] for instant in made.recording.scans])
+    assert not scanned.all()
+    np.testing.assert_array_equal(given[1].scanned, scanned)
 
 
 def rows_of(columns: Mapping[str, Any]) -> dict[tuple[str, float], tuple[float, float]]:

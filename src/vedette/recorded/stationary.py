@@ -33,9 +33,9 @@ def stationary_places(
     """
     scans = placed_scans(recording, s, site, model)
     none = np.empty((0, 2)), [np.zeros(len(scan.places), np.bool_) for scan in scans]
-    if model.stds is None or len(scans) < _PARTS * _SCANS_A_PART[0]:
+    places = np.concatenate([np.empty((0, 2)), *(scan.places for scan in scans)])
+    if model.stds is None or len(scans) < _PARTS * _SCANS_A_PART[0] or not len(places):
         return none
-    places = np.concatenate([scan.places for scan in scans])
     reach = _REACH * np.concatenate([scan.stds for scan in scans])
     num = max(_PARTS, len(scans) // _SCANS_A_PART[1])
     part = np.repeat(np.arange(len(scans)) * num // len(scans), [len(scan.places) for scan in scans])
