@@ -4,11 +4,13 @@
     python benchmarks/turning.py --scenes 3 --runs 2 --planners jdm sweep
     python benchmarks/turning.py --write docs/evidence/turning-cameras.md
     python benchmarks/turning.py --blind               # no scan while the camera turns
+    python benchmarks/turning.py --drawn --planners jdm sweep
 
 Each scene is drawn: one camera that turns at 10 to 20 degrees a second and sees 24 to 40 degrees; two to five slow
 targets 100 to 300 m away in any directions; decisions every 1, 2 or 4 s with a horizon of 4 s; targets expected at
-sites (existence .9, at the first scan), or born anywhere. `sweep` turns on and on, one way, as fast as the camera can;
-a blind one by a field of view at a time, where it stays for a decision.
+sites (existence .9, at the first scan), or born anywhere. They move less than filters expect, or `--drawn` from the
+model: from their sites, with process noise. `sweep` turns on and on, one way, as fast as the camera can;
+a blind one by a field of view at a time, where it stays for a decision (`lawnmower` in `benchmarks/hand_rules.py`).
 Prints mean OSPA in m (cutoff 100 m) with one standard error, and paired differences to the first planner.
 """
 
@@ -16,18 +18,16 @@ from __future__ import annotations
 
 import argparse
 import json
-from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from hand_rules import RULES
 from pages import write_between
 
-from vedette.control import Plan
 from vedette.evaluation.metrics import ospa_of_run
 from vedette.kernels.base.types import Floats
-from vedette.models.measurement import wrap_angles
 from vedette.scenarios import Scenario, parse_scenario
 from vedette.scenarios.build import build_experiment, build_planner
 from vedette.simulation import simulate
@@ -36,13 +36,19 @@ PLANNERS = ("jdm", "sweep", "nearest", "random")
 SEED, STEPS, CUTOFF, POINTINGS, HORIZON = 7, 100, 100.0, 36, 4
 
 
-def scene(number: int, *, blind: bool = False) -> Scenario:
+def scene(number: int, *, blind: bool = False, drawn: bool = False) -> Scenario:
     """One of the scenes; the same for a number."""
     rng = np.random.default_rng([SEED, number])
     num, every, anywhere = int(rng.integers(2, 6)), int(rng.choice([1, 2, 4])), bool(number % 2)
     bearings, distances = rng.uniform(-np.pi, np.pi, num), rng.uniform(100.0, 300.0, num)
     places = distances[:, np.newaxis] * np.column_stack([np.cos(bearings), np.sin(bearings)])
-    tracks = [{"state": [*place, *rng.normal(0.0, 1.0, 2).tolist()], "start_step": 1} for place in places.tolist()]
+    velocities = [rng.normal(0.0, 1.0, 2).tolist() for _ in places]
+    tracks: list[dict[str, Any]] = [
+        {"state": [*place, *own], "start_step": 1} for place, own in zip(places.tolist(), velocities, strict=True)
+    ]
+    if drawn:
+        spread = {"std": [20.0, 20.0, 2.0, 2.0], "process_noise": True}
+        tracks = [{**own, "state": [*own["state"][:2], 0.0, 0.0], **spread} for own in tracks]
     sites = [{"existence": 0.9, "mean": [*place, 0.0, 0.0], "std": [20.0, 20.0, 2.0, 2.0]} for place in places.tolist()]
     measured = {"expected": 0.2, "max_existence": 0.1, "std": [10.0, 10.0, 2.0, 2.0]}
     data: dict[str, Any] = {
@@ -79,38 +85,13 @@ def scene(number: int, *, blind: bool = False) -> Scenario:
     return Scenario(parse_scenario(json.dumps(data)), Path("turning.yaml"))
 
 
-class Sweep:
-    """Turns on and on: at each decision to the pointing a third of a turn ahead, counter-clockwise.
-
-    A camera that is blind while it turns goes on by its field of view once it has arrived.
-    """
-
-    name = "sweep"
-
-    def __init__(self, planner: Any, *, blind: bool) -> None:
-        self.planner, self.blind = planner, blind
-        self.last: int | None = None  # the pointing that it turns to
-
-    def plan(self, state: Any, poses: Floats, *, rng: np.random.Generator) -> Plan:
-        """Made of any plan, for its options."""
-        plan: Plan = self.planner.plan(state, poses, rng=rng)
-        pointings, (now, half_width) = np.radians(plan.actions[0].values[:, 0]), poses[0][3:5]
-        if not self.blind or self.last is None or abs(wrap_angles(pointings[self.last] - now)) < 1e-6:
-            ahead = 2.0 * half_width if self.blind else 2.0 * np.pi / 3.0
-            self.last = int(np.abs(wrap_angles(pointings - now - ahead)).argmin())
-        return replace(plan, chosen=(self.last,), analysis=None, bound=None)
-
-
 def errors(scenario: Scenario, planner: str, runs: int) -> Floats:
     """(runs,) mean OSPA, m."""
     experiment, score = build_experiment(scenario), partial(ospa_of_run, cutoff=CUTOFF, order=1.0)
-    blind = scenario.model.sensors[0].platform.blind_while_turning
 
     def made() -> Any:
         """A sweep begins anew in each run."""
-        if planner == "sweep":
-            return Sweep(build_planner(scenario, "random", 1), blind=blind)
-        return build_planner(scenario, planner, 1)
+        return RULES["lawnmower"](scenario) if planner == "sweep" else build_planner(scenario, planner, 1)
 
     records = [simulate(experiment, made(), seed=SEED, run=run, score=score) for run in range(runs)]
     return np.array([record.ospa[:, 0].mean() for record in records])
@@ -137,13 +118,14 @@ def main() -> None:
     parser.add_argument("--runs", type=int, default=8, help="of each scene, at least 2")
     parser.add_argument("--planners", nargs="+", choices=PLANNERS, default=PLANNERS)
     parser.add_argument("--blind", action="store_true", help="the camera makes no scan while it turns")
+    parser.add_argument("--drawn", action="store_true", help="targets are drawn from the model")
     parser.add_argument("--write", type=Path, metavar="PAGE", help="Markdown page with a place for the table")
     given = parser.parse_args()
     first = given.planners[0]
     lines = [f"| Scene | {' | '.join(given.planners)} |", f"| --- |{' ---: |' * len(given.planners)}"]
     found: dict[str, list[Floats]] = {planner: [] for planner in given.planners}
     for number in range(given.scenes):
-        scenario = scene(number, blind=given.blind)
+        scenario = scene(number, blind=given.blind, drawn=given.drawn)
         for planner in given.planners:
             found[planner].append(errors(scenario, planner, given.runs))
         cells = " | ".join(with_error(found[planner][-1]) for planner in given.planners)

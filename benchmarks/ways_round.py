@@ -1,14 +1,16 @@
 """Sensors and targets with a no-go zone between them: walls, a ring with one gap, two zones that overlap.
 
-    python benchmarks/ways_round.py                                       # all scenes, 10 runs, jdm
-    python benchmarks/ways_round.py wall-80 ring --planners jdm nearest --runs 20 --out after.jsonl
+    python benchmarks/ways_round.py                                       # all kinds, 10 runs, jdm
+    python benchmarks/ways_round.py --kinds wall-80 ring --planners jdm nearest --runs 20 --out after.jsonl
     python benchmarks/ways_round.py --against before.jsonl --out after.jsonl
 
 Each run has a layout of its own, drawn from its number: two sensors that see 60 m and step 20 m after every scan, and
 three targets, on the two sides of the zone. Runs are paired: at the same number all planners and versions of the code
-meet the same layout, truth and random numbers. The table has the mean OSPA (cutoff 60 m, order 1) over scans and runs,
-and CPU seconds of a run, with one standard error. With `--against`, a file that another version of the code wrote by
-`--out`, it has the paired difference to that as well; negative is better.
+meet the same layout, truth and random numbers. The table has the mean OSPA (cutoff 60 m, order 1) over scans and runs
+of the first planner with one standard error, and its CPU seconds of a run. For each other planner it has the paired
+difference to the first; negative is better than the first, and a star marks more than two standard errors. With
+`--against`, a file that another version of the code wrote by `--out`, it has the paired difference of the first planner
+to that as well. `--seed` draws other layouts.
 """
 
 from __future__ import annotations
@@ -16,12 +18,14 @@ from __future__ import annotations
 import argparse
 import json
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from hand_rules import RULES
+from pages import write_between
 
 from vedette.evaluation.metrics import ospa_of_run
 from vedette.kernels.base.types import Floats
@@ -86,14 +90,21 @@ def measured(scenario: Scenario, planner: str, run: int) -> tuple[float, float]:
     """Mean OSPA, m, and CPU seconds of one run."""
     experiment, ospa = build_experiment(scenario), scenario.model.ospa
     score = partial(ospa_of_run, cutoff=ospa.cutoff, order=ospa.order, components=ospa.components)
+    made = RULES[planner](scenario) if planner in RULES else build_planner(scenario, planner, 1)
     began = time.process_time()
-    record = simulate(experiment, build_planner(scenario, planner, 1), seed=SEED, run=run, score=score)
+    record = simulate(experiment, made, seed=SEED, run=run, score=score)
     return float(record.ospa[:, 0].mean()), time.process_time() - began
 
 
-def with_error(values: Floats) -> str:
+def with_error(values: Floats, sign: str = "") -> str:
     """Mean and standard error."""
-    return f"{values.mean():.1f} +- {values.std(ddof=1) / np.sqrt(len(values)):.1f}"
+    return f"{values.mean():{sign}.1f} ± {values.std(ddof=1) / np.sqrt(len(values)):.1f}".replace("-", "\u2212")
+
+
+def difference(values: Floats) -> str:
+    """A paired difference, with a star if it is negative by more than two standard errors."""
+    star = values.mean() < -2.0 * values.std(ddof=1) / np.sqrt(len(values))
+    return with_error(values, "+") + (" *" if star else "")
 
 
 def kept(file: Path | None) -> dict[Key, tuple[float, float]]:
@@ -105,34 +116,61 @@ def kept(file: Path | None) -> dict[Key, tuple[float, float]]:
 
 
 def main(
-    description: str | None, scenes: list[str], scene_of: Callable[[str, int], Scenario], usual: list[str]
+    description: str | None, script: str, kinds: list[str], scene_of: Callable[[str, int], Scenario], usual: list[str]
 ) -> None:
     """Run, and print the table. usual: planners unless others are named."""
     parser = argparse.ArgumentParser(description=description, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("scenes", nargs="*", default=scenes, help="of: " + ", ".join(scenes))
+    parser.add_argument("--kinds", nargs="+", choices=kinds, default=kinds, metavar="KIND", help=", ".join(kinds))
     parser.add_argument("--planners", nargs="+", default=usual)
-    parser.add_argument("--runs", type=int, default=10)
-    parser.add_argument("--out", type=Path)
-    parser.add_argument("--against", type=Path)
+    parser.add_argument("--runs", type=int, default=10, help="of each kind, at least 2")
+    parser.add_argument("--seed", type=int, default=0, help="of the layouts")
+    parser.add_argument("--out", type=Path, help="file of results, which is continued")
+    parser.add_argument("--against", type=Path, help="file of results of another version of the code")
+    parser.add_argument("--write", type=Path, metavar="PAGE", help="Markdown page with a place for the table")
     given = parser.parse_args()
     found, before = kept(given.out), kept(given.against)
-    print("| scene | planner | OSPA, m | CPU, s | difference, m |\n| --- | --- | ---: | ---: | ---: |")
-    for scene in given.scenes:
-        for planner in given.planners:
-            keys = [(scene, planner, run) for run in range(given.runs)]
-            for key in keys:
-                if key in found:
-                    continue
-                found[key] = measured(scene_of(scene, key[2]), planner, key[2])
-                if given.out is not None:
-                    row = dict(zip(("scene", "planner", "run", "ospa", "seconds"), (*key, *found[key]), strict=True))
-                    with given.out.open("a", encoding="utf-8") as file:
-                        file.write(json.dumps(row) + "\n")
-            values = np.array([found[key] for key in keys])
-            pairs = np.array([found[key][0] - before[key][0] for key in keys if key in before])
-            gained = with_error(pairs) if len(pairs) > 1 else ""
-            print(f"| {scene} | {planner} | {with_error(values[:, 0])} | {values[:, 1].mean():.1f} | {gained} |")
+    first, runs = given.planners[0], range(1000 * given.seed, 1000 * given.seed + given.runs)
+    heads = [f"{first}, m", "CPU, s", *given.planners[1:], *(["to before"] if before else [])]
+    lines = [f"| Kind | {' | '.join(heads)} |", f"| --- |{' ---: |' * len(heads)}"]
+    print(*lines, sep="\n")
+    means = []
+    for kind in given.kinds:
+        rows = {planner: values_of(found, given.out, scene_of, kind, planner, runs) for planner in given.planners}
+        cells = [with_error(rows[first][:, 0]), f"{rows[first][:, 1].mean():.1f}"]
+        cells += [difference(rows[planner][:, 0] - rows[first][:, 0]) for planner in given.planners[1:]]
+        pairs = [
+            found[kind, first, run][0] - before[kind, first, run][0] for run in runs if (kind, first, run) in before
+        ]
+        cells += [difference(np.array(pairs)) if len(pairs) > 1 else ""] if before else []
+        lines.append(f"| {kind} | {' | '.join(cells)} |")
+        print(lines[-1], flush=True)
+        means.append([rows[planner][:, 0].mean() - rows[first][:, 0].mean() for planner in given.planners[1:]])
+    if len(means) > 1 and len(given.planners) > 1:
+        more = [with_error(column, "+") for column in np.transpose(means)]
+        lines.append(f"| **mean of kinds** | | | {' | '.join([*more, *([''] if before else [])])} |")
+        print(lines[-1])
+    if given.write is not None:
+        write_between(given.write, script, "\n".join(lines))
+
+
+def values_of(
+    found: dict[Key, tuple[float, float]],
+    out: Path | None,
+    scene_of: Callable[[str, int], Scenario],
+    kind: str,
+    planner: str,
+    runs: Iterable[int],
+) -> Floats:
+    """(num_runs, 2) mean OSPA, m, and CPU seconds; what is not in `found` is run, and added to it and to a file."""
+    for key in [(kind, planner, run) for run in runs]:
+        if key not in found:
+            found[key] = measured(scene_of(kind, key[2]), planner, key[2])
+            row = dict(zip(("scene", "planner", "run", "ospa", "seconds"), (*key, *found[key]), strict=True))
+            if out is not None:
+                with out.open("a", encoding="utf-8") as file:
+                    file.write(json.dumps(row) + "\n")
+    return np.array([found[kind, planner, run] for run in runs])
 
 
 if __name__ == "__main__":
-    main(__doc__, list(SCENES), scenario_of, ["jdm"])
+    main(__doc__, "ways_round.py", list(SCENES), scenario_of, ["jdm"])
