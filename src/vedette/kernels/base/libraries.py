@@ -66,7 +66,7 @@ class WholeLibrary(JITCodeLibrary):  # type: ignore[misc]
         """Link again the parts that LLVM left out because nothing linked before used them, then optimise.
 
         Linking every caller before its parts would leave nothing out, but the code that LLVM then makes is 7 to 13 %
-        slower in decisions on GLMBs.
+        slower in decisions on GLMBs. Parts that are linked in may call others, which are missing then.
         """
         missing = _names(self._final_module, declared=True)
         while missing:
@@ -75,8 +75,10 @@ class WholeLibrary(JITCodeLibrary):  # type: ignore[misc]
                 if missing & _names(module, declared=False):
                     self._final_module.link_in(module, preserve=True)
             left = _names(self._final_module, declared=True)
-            missing = left if left < missing else set()
+            missing = left if left != missing else set()
         super()._optimize_final_module()
+        if left := _names(self._final_module, declared=True):  # it would call address 0
+            raise RuntimeError(f"the code of {', '.join(sorted(left))} was not found")
 
     def serialize_using_object_code(self) -> tuple[str, str, Any]:
         """Return machine code and the names that it defines. The source is not needed, as nothing links a whole."""
