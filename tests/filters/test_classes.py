@@ -195,6 +195,11 @@ def test_faults_are_named() -> None:
     with pytest.raises(InputError, match=r"class_ratios: expected an array of shape \(1, any\); got shape \(2, 3\)"):
         with_features(NEAR, ratios(2))
     with pytest.raises(InputError, match=r"log_class_probs\[0:2\]: expected weights that sum to 1"):
-        Poisson(np.zeros(1), np.zeros((1, 4)), np.eye(4)[np.newaxis], Marks(np.log([[0.5, 0.4]])))
+        Poisson(
+            np.zeros(1),
+            np.zeros((1, 4)),
+            np.eye(4)[np.newaxis],
+            Marks(np.log([[0.5, 0.4]]), np.empty((1, 0), np.int64)),
+        )
     like = replace(birth(), class_probs=PROBS)
     assert [kind.empty(like).num_classes for kind in (LMB, GLMB, FactoredGLMB)] == [3, 3, 3]

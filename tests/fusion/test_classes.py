@@ -23,7 +23,9 @@ WEIGHTS = np.array([0.3, 0.7])
 
 def with_classes(belief: Any, rng: np.random.Generator, num_classes: int = 3) -> Any:
     probs = rng.dirichlet(np.ones(num_classes), len(belief.tracks.log_weights))
-    return replace(belief, tracks=replace(belief.tracks, marks=Marks(np.log(probs))))
+    return replace(
+        belief, tracks=replace(belief.tracks, marks=Marks(np.log(probs), np.empty((len(probs), 0), np.int64)))
+    )
 
 
 def lmbs(seed: int, num: int = 2) -> tuple[list[LMB], list[LMB]]:
@@ -110,7 +112,7 @@ def test_parallel_update_of_labels_in_one_factor(seed: int) -> None:
 
     def classified(belief: Any) -> Any:
         tiled = np.tile(probs, (len(belief.tracks.log_weights), 1))
-        return replace(belief, tracks=replace(belief.tracks, marks=Marks(tiled)))
+        return replace(belief, tracks=replace(belief.tracks, marks=Marks(tiled, np.empty((len(tiled), 0), np.int64))))
 
     expected, _ = ParallelUpdate().fuse([joint, plain], predicted(plain))
     fused, _ = ParallelUpdate().fuse([classified(joint), classified(plain)], predicted(classified(plain)))
@@ -140,7 +142,7 @@ def test_a_class_that_is_impossible_before_and_after_a_scan_stays_so() -> None:
         probs[:, 0] = 0.0
         with np.errstate(divide="ignore"):
             logs = np.log(probs / probs.sum(axis=1, keepdims=True))
-        return replace(belief, tracks=replace(belief.tracks, marks=Marks(logs)))
+        return replace(belief, tracks=replace(belief.tracks, marks=Marks(logs, np.empty((len(logs), 0), np.int64))))
 
     own = [without_first(belief) for belief in own]
     fused = [as_lmb(ParallelUpdate().fuse(own[1:], predicted(own[0]))[0]), rebase(own[0], own[1], own[2])]

@@ -10,8 +10,9 @@ import pytest
 
 from vedette import models
 from vedette.errors import ModelError
+from vedette.kernels.gaussian.prediction import survival_probabilities
 from vedette.kernels.planning.cells import cells_in_view
-from vedette.kernels.steps.undetected import survival_probabilities, take_out_detected
+from vedette.kernels.steps.undetected import take_out_detected
 from vedette.models.functions import model_function
 
 pytestmark = pytest.mark.lanes

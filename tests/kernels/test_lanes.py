@@ -118,7 +118,7 @@ def check_against_one_at_a_time(sensor: models.SensorModel, moves: Any, forms: A
     expected, scratch = make_innovation(1, dim, sensor.meas_dim), make_scratch(dim, sensor.meas_dim)
     mean, cov, lower, few = np.empty(dim), np.empty((dim, dim)), np.tril_indices(dim), np.tril_indices(sensor.meas_dim)
     for s in range(NUM):
-        predict(moves, DT, means[s], covs[s], mean, cov, scratch)
+        predict(moves, 0, DT, means[s], covs[s], mean, cov, scratch)
         expect(sees, POSE, mean, cov, 0, expected, scratch)
         close: dict[str, Any] = {"rtol": 1e-12, "atol": 1e-12}
         np.testing.assert_allclose(batch.means[:, s], mean, **close)

@@ -13,7 +13,8 @@ import vedette
 SRC = Path(vedette.__file__).parents[1]
 KERNELS = Path("vedette", "kernels")
 CLASSES_ALONE = "    if out.log_class_probs.shape[1] == 0:\n        return"
-POOLED = "    for k in range(out.log_class_probs.shape[1]):\n        out.log_class_probs[target, k] = 0.0\n"
+MERGED = "    set_mode(out, target, _common_mode(marks, chosen, count))\n"
+POOLED = "    set_mode(out, target, mode)\n"
 
 # The column `number`: components of different numbers are of different targets, and do not merge.
 EDITS = {
@@ -25,16 +26,23 @@ EDITS = {
     ],
     KERNELS / "gaussian" / "marks.py": [
         ("Marks(np.empty((num, marks.", "Marks(np.empty((num, marks.number.shape[1])), np.empty((num, marks."),
+        ("Marks(np.empty((num, 0)),", "Marks(np.empty((num, 0)), np.empty((num, 0)),"),
         ("Marks(np.empty((num, measurements", "Marks(np.empty((num, 0)), np.empty((num, measurements"),
-        ("Marks(np.empty((num, 0)))", "Marks(np.empty((num, 0)), np.empty((num, 0)))"),
         ("Marks(marks.log_class_probs[first", "Marks(marks.number[first:last], marks.log_class_probs[first"),
-        ("    for k in range(min(", "{copy}    for k in range(min("),
         (
-            "    return True",
-            "    return marks.number.shape[1] == 0 or marks.number[first, 0] == marks.number[second, 0]",
+            "    set_mode(out, target, mode_of(marks, source))\n",
+            "    set_mode(out, target, mode_of(marks, source))\n{copy}",
         ),
-        (f"{CLASSES_ALONE}\n", f"{{first}}{CLASSES_ALONE}\n"),
-        (f"{CLASSES_ALONE} 0.0\n{POOLED}", f"{{first}}{CLASSES_ALONE} 0.0\n{POOLED}"),
+        (
+            "    return mode_of(marks, first) ==",
+            "    if marks.number.shape[1] > 0 and marks.number[first, 0] != marks.number[second, 0]:\n"
+            "        return False\n    return mode_of(marks, first) ==",
+        ),
+        (MERGED, f"{{first}}{MERGED}"),
+        (POOLED, f"{{first}}{POOLED}"),
+        ("    classes, modes = zip(", "    numbers, classes, modes = zip("),
+        ("Marks(np.concatenate(classes)", "Marks(np.concatenate(numbers), np.concatenate(classes)"),
+        ("Marks(marks.log_class_probs[places]", "Marks(marks.number[places], marks.log_class_probs[places]"),
     ],
 }
 INSERTED = {
@@ -55,6 +63,9 @@ from vedette.fusion import ArithmeticAverage, Clmb, CmDeltaGlmb
 from vedette.kernels.gaussian.components import components_of
 from vedette.kernels.gaussian.reduction import MixtureCaps, reduce_mixture
 
+def marked(numbers, classes):
+    return Marks(number=numbers, log_class_probs=classes, modes=np.empty((len(numbers), 0), np.int64))
+
 region = models.Region(-100.0, 100.0, -100.0, 100.0)
 motion, survival = models.constant_velocity(1.0), models.constant_survival(0.99)
 targets = models.TargetModel(motion, survival, models.BirthModel.none(4))
@@ -62,7 +73,7 @@ parts = models.position(), models.constant_noise([3.0, 3.0]), models.constant_de
 sensor = models.SensorModel(*parts, models.region_clutter(2.0, region, "position"))
 means = np.array([[-20.0, 0.0, 0.0, 0.0], [-19.0, 0.0, 0.0, 0.0], [20.0, 0.0, 0.0, 0.0], [21.0, 0.0, 0.0, 0.0]])
 covs, numbers = np.tile(np.eye(4), (4, 1, 1)), np.array([[1.0], [1.0], [2.0], [2.0]])
-marks, logs = Marks(number=numbers, log_class_probs=np.empty((4, 0))), np.log(np.full(4, 0.5))
+marks, logs = marked(numbers, np.empty((4, 0))), np.log(np.full(4, 0.5))
 table = replace(LMB.empty(4).tracks, labels=np.array([[0, 1], [0, 2]]), offsets=np.array([0, 2, 4]), log_weights=logs,
                 means=means, covs=covs, marks=marks)
 lmb = LMB(table, np.array([2.0, 1.0]))
@@ -90,7 +101,7 @@ for kind, belief in ((LmbFilter, lmb), (DeltaGlmbFilter, as_sets(lmb)), (Factore
     for limits in (Limits(), one):
         check(step(kind, belief, limits))
 for classes in (np.empty((4, 0)), np.log(np.full((4, 2), 0.5))):
-    own = replace(table, marks=Marks(number=numbers, log_class_probs=classes))
+    own = replace(table, marks=marked(numbers, classes))
     check(LMB(single_gaussians(own), lmb.existence_logit))
 intensity = Poisson(logs, means, covs, marks)
 found = step(PhdFilter, intensity)
@@ -98,7 +109,7 @@ np.testing.assert_array_equal(found.marks.number[:, 0], np.where(found.means[:, 
 for rule in (Clmb([0.4, 0.6]), ArithmeticAverage([0.4, 0.6])):
     check(rule.fuse([lmb, step(LmbFilter, lmb)])[0])
 check(CmDeltaGlmb([0.4, 0.6]).fuse([as_sets(lmb), as_sets(step(LmbFilter, lmb))])[0])
-near = components_of(logs[:2], means[:2], covs[:2], Marks(number=numbers[1:3], log_class_probs=np.empty((2, 0))))
+near = components_of(logs[:2], means[:2], covs[:2], marked(numbers[1:3], np.empty((2, 0))))
 assert len(reduce_mixture(near, MixtureCaps(-9.0, 3.0, 9)).log_weights) == 2
 assert len(reduce_mixture(components_of(*near[:3]), MixtureCaps(-9.0, 3.0, 9)).log_weights) == 1
 """
@@ -109,7 +120,7 @@ def test_a_column_is_two_files(tmp_path: Path) -> None:
     for path, edits in EDITS.items():
         text = (tmp_path / path).read_text("utf-8")
         for old, new in edits:
-            assert text.count(old) == 1, old
+            assert old in text, old
             for name, lines in INSERTED.items():
                 new = new.replace(name, lines)
             text = text.replace(old, new)

@@ -71,7 +71,7 @@ def test_bundles_hold_the_functions_and_parameters():
     bundle = models.kernel_motion(cv, models.constant_survival(0.98))
     assert bundle.transition is cv.transition
     assert bundle.method == LINEARISED
-    np.testing.assert_array_equal(bundle.noise_params, [5.0])
+    np.testing.assert_array_equal(bundle.noise_params, [[5.0]])
     np.testing.assert_array_equal(bundle.survival_params, [0.98])
     for vector in (bundle.transition_params, bundle.noise_params, bundle.survival_params):
         assert vector.dtype == np.float64

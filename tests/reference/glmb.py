@@ -46,6 +46,10 @@ class Model:
             return gaussian.ekf_predict(mean, cov, self.transition, self.transition_jacobian, noise)
         return gaussian.sigma_predict(mean, cov, self.transition, noise, kappa=self._kappa())
 
+    def predictions(self, mean: Floats, cov: Floats) -> list[tuple[float, Floats, Floats]]:
+        """The components that one becomes, with their shares of its weight: one, without modes."""
+        return [(1.0, *self.predict(mean, cov))]
+
     def update(self, mean: Floats, cov: Floats, measurement: Floats) -> gaussian.Update:
         noise = self.measurement_noise_cov(mean)
         if self.method == "ekf":
@@ -67,7 +71,7 @@ def normalised(mixture: Mixture) -> tuple[float, Mixture]:
 def survive(mixture: Mixture, model: Model) -> tuple[float, Mixture]:
     """Probability of survival, and the predicted density of a survivor."""
     total, survivors = normalised([(w * model.prob_survival(m), m, c) for w, m, c in mixture])
-    return total, [(w, *model.predict(m, c)) for w, m, c in survivors]
+    return total, [(w * share, m, c) for w, *before in survivors for share, m, c in model.predictions(*before)]
 
 
 def observe(mixture: Mixture, measurement: Floats | None, model: Model) -> tuple[float, Mixture]:

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from vedette.errors import InputError, NumericalError, VedetteError
 from vedette.kernels.base.types import Bools, Floats, Ints, Marks
+from vedette.kernels.gaussian.marks import NOT_DRAWN, unmarked
 from vedette.models.arguments import as_array
 
 NORMALISATION_TOLERANCE = 1e-9
@@ -181,8 +182,10 @@ def check_components(field: str, density: Any, error: type[VedetteError] = Numer
     check_covariances(f"{field}covs", covs, error)
     if not isinstance(marks, Marks):
         raise InputError(f"{field}marks: expected Marks; got {type(marks).__name__}")
-    for name, column in zip(Marks._fields, marks, strict=True):
-        check_array(f"{field}marks.{name}", column, np.float64, (num_components, None))
+    for name, column, none in zip(Marks._fields, marks, unmarked(), strict=True):
+        check_array(f"{field}marks.{name}", column, none.dtype.type, (num_components, None))
+    if (marks.modes < NOT_DRAWN).any():
+        raise error(f"{field}marks.modes: expected modes of at least {NOT_DRAWN}; got {marks.modes.min()}")
     classes = marks.log_class_probs
     if classes.size:
         name, flat = f"{field}marks.log_class_probs", classes.reshape(-1)

@@ -9,7 +9,7 @@ from __future__ import annotations
 from abc import abstractmethod
 from collections.abc import Callable
 from operator import attrgetter
-from typing import Any, ClassVar, Self, TypeVar
+from typing import Any, ClassVar, Self, TypeVar, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -76,8 +76,9 @@ class Components(Container):
         """Likewise. A column of marks without width gets a row for each component."""
         if type(value) is not Marks:
             return super()._owned(value)
-        none = np.empty((len(self.log_weights), 0))
-        return Marks(*(self._owned(none if np.shape(column)[1:] == (0,) else column) for column in value))
+        num = len(self.log_weights)
+        rows = (column.reshape(num, 0) if np.shape(column)[1:] == (0,) else column for column in value)
+        return Marks(*map(self._owned, rows))
 
     @property
     def state_dim(self) -> int:
@@ -140,10 +141,8 @@ def unchecked(container: type[_Made], *fields: Any) -> _Made:
         if type(value) is array and type(value.base) is not array and value.flags.carray:
             value = value.view()  # the common case, without a call of _held
             value.setflags(False)  # type: ignore[call-arg]  # three times as fast as by keyword
-        elif type(value) is array:
+        elif type(value) is array or type(value) is Marks:
             value = _held(value)
-        elif type(value) is Marks:
-            value = Marks._make(map(_held, value))
         put(made, name, value)
     return made
 
@@ -170,14 +169,18 @@ def no_components(like: Any) -> Mixture:
 
 def _held(value: Any) -> Any:
     """Return an array as a read-only field, without a copy if possible, also in marks, and anything else as it is."""
-    if type(value) is not np.ndarray:
-        return Marks(*map(_held, value)) if type(value) is Marks else value
-    base, flags = value.base, value.flags
-    if type(base) is not np.ndarray:
-        view = value.view() if flags.carray else np.array(value, order="C").view()
-    elif not flags.writeable and value.size == base.size and value.strides == base.strides:
+    if type(value) is not np.ndarray and type(value) is not Marks:
         return value
-    else:  # a part of another array, whose base has another shape
-        view = np.array(value, order="C").view()
-    view.setflags(False)  # type: ignore[call-arg]  # three times as fast as by keyword or attribute
-    return view
+    held, arrays = list[Any](), cast(tuple[Any, ...], value if type(value) is Marks else (value,))
+    for array in arrays:
+        base, flags = array.base, array.flags
+        if type(base) is not np.ndarray:
+            view = array.view() if flags.carray else np.array(array, order="C").view()
+        elif not flags.writeable and array.size == base.size and array.strides == base.strides:
+            held.append(array)
+            continue
+        else:  # a part of another array, whose base has another shape
+            view = np.array(array, order="C").view()
+        view.setflags(False)  # type: ignore[call-arg]  # three times as fast as by keyword or attribute
+        held.append(view)
+    return Marks(*held) if type(value) is Marks else held[0]

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any, Protocol
 
 import numpy as np
 
 from vedette.densities import checks
+from vedette.densities.containers import for_kernel
 from vedette.densities.conversions import resolve_labels
 from vedette.densities.factored import FactoredGLMB
 from vedette.densities.glmb import GLMB
@@ -18,19 +19,25 @@ from vedette.densities.labelled import LMB, LabelledDensity
 from vedette.densities.multi_bernoulli import MultiBernoulli
 from vedette.densities.statistics import cardinality_distribution, check_labelled
 from vedette.densities.tracks import (
+    OF_ANY_MODE,
     TrackTable,
     gaussian_tracks,
     heaviest_components,
     merged_tracks,
+    mode_probabilities,
+    over_modes,
     take_tracks,
 )
 from vedette.densities.unlabelled import IidCluster, Poisson
 from vedette.errors import InputError, NumericalError, VedetteError
 from vedette.internal.representation import TabularRepr
 from vedette.internal.text import pluralise
-from vedette.kernels.base.types import Floats, Ints
-from vedette.kernels.gaussian.components import taken_components
+from vedette.kernels.base.types import Floats, Ints, Tracks
+from vedette.kernels.gaussian.components import taken_components, without_modes
+from vedette.kernels.gaussian.marks import unmarked
+from vedette.kernels.gaussian.pooling import reduced_tracks
 from vedette.kernels.gaussian.position_integrals import spread_nodes
+from vedette.kernels.gaussian.reduction import reduce_mixture
 from vedette.kernels.labelled.heaviest import map_tracks
 from vedette.kernels.labelled.least_ospa import least_ospa_tracks
 from vedette.models.arguments import no_gaussians, positive, reject
@@ -53,6 +60,8 @@ class Estimate(TabularRepr):
         existence: (num_targets,) probability that the label's target exists, over the whole density.
         class_probs: (num_targets, num_classes) probability of each class of target, which sum to 1, in the order of
             `BirthModel.class_probs`, without columns if targets have no classes.
+        mode_probs: (num_targets, up to num_modes) probability of each mode of motion, up to the last that any target
+            may be in. They sum to 1, or to less for a new target, whose mode is not drawn yet.
     """
 
     labels: Ints
@@ -60,10 +69,13 @@ class Estimate(TabularRepr):
     covs: Floats
     existence: Floats
     class_probs: Floats = field(default_factory=checks.no_classes)
+    mode_probs: Floats = field(default_factory=checks.no_classes)
 
     def __post_init__(self) -> None:
-        if self.class_probs.size == 0:
-            object.__setattr__(self, "class_probs", np.empty((len(self.labels), self.class_probs.shape[1])))
+        for name in ("class_probs", "mode_probs"):
+            probs = getattr(self, name)
+            if probs.size == 0:
+                object.__setattr__(self, name, np.empty((len(self.labels), probs.shape[1])))
 
     @property
     def num_targets(self) -> int:
@@ -115,9 +127,18 @@ class Estimate(TabularRepr):
         checks.check_finite("means", self.means, error)
         checks.check_covariances("covs", self.covs, error)
         checks.check_array("class_probs", self.class_probs, np.float64, (self.num_targets, None))
-        for name, values in (("existence", self.existence), ("class_probs", self.class_probs)):
+        checks.check_array("mode_probs", self.mode_probs, np.float64, (self.num_targets, None))
+        for name in ("existence", "class_probs", "mode_probs"):
+            values = getattr(self, name)
             if not np.all((values >= 0.0) & (values <= 1.0)):
                 raise error(f"{name}: expected probabilities; got {values.tolist()}")
+
+
+def joined_mode_probs(estimates: Sequence[Estimate], num_modes: int = 0) -> Floats:
+    """Return the probabilities of modes of all targets of all estimates, in columns for at least `num_modes`."""
+    width = max((estimate.mode_probs.shape[1] for estimate in estimates), default=0)
+    missing = ((own.mode_probs, max(width, num_modes) - own.mode_probs.shape[1]) for own in estimates)
+    return np.concatenate([np.pad(probs, ((0, 0), (0, more))) for probs, more in missing])
 
 
 class Estimator(Protocol):
@@ -187,8 +208,9 @@ def least_gospa_estimate(density: LabelledDensity, cutoff: float = 100.0, order:
         of_points = (ratios**order).mean(axis=-1) @ np.exp(tracks.log_weights[own])
         best = int(np.argmin(of_points))
         means[i], covs[i], errors[i] = points[best], spreads[best], of_points[best]
-    chosen = np.flatnonzero(2.0 * existence * (1.0 - errors) > 1.0)
-    return _peaks(gaussian_tracks(tracks.labels, means, covs, marks), chosen, existence[chosen])
+    chosen, modes = np.flatnonzero(2.0 * existence * (1.0 - errors) > 1.0), mode_probabilities(tracks)
+    found = _peaks(gaussian_tracks(tracks.labels, means, covs, marks), chosen, existence[chosen])
+    return replace(found, mode_probs=modes[chosen])
 
 
 def best_estimate(density: Any, step: int) -> Estimate:
@@ -219,12 +241,14 @@ def marginal_estimate(density: LabelledDensity, threshold: float = 0.5) -> Estim
 
 
 def _peaks(tracks: TrackTable, chosen: Ints, existence: Floats) -> Estimate:
-    """Return the estimate at the heaviest component of each chosen track."""
-    heaviest = heaviest_components(tracks.log_weights, tracks.offsets, chosen)
+    """Return the estimate at the heaviest component of each chosen track, near ones of different modes taken as one."""
+    own = over_modes(tracks)
+    heaviest = heaviest_components(own.log_weights, own.offsets, chosen)
     classes = checks.no_classes()
     if tracks.num_classes:
         classes = np.exp(merged_tracks(take_tracks(tracks, chosen)).marks.log_class_probs)
-    return Estimate(tracks.labels[chosen], tracks.means[heaviest], tracks.covs[heaviest], existence, classes)
+    modes = mode_probabilities(tracks)[chosen]
+    return Estimate(own.labels[chosen], own.means[heaviest], own.covs[heaviest], existence, classes, modes)
 
 
 def at_dominant_components(density: LMB) -> LMB:
@@ -233,9 +257,9 @@ def at_dominant_components(density: LMB) -> LMB:
     The mean of two rival components may lie where the target cannot be, and their spread is an error that scans cannot
     reduce: after two targets have been close, no scan can distinguish their labels.
     """
-    tracks, num = density.tracks, density.tracks.num_tracks
+    tracks, num = over_modes(density.tracks), density.tracks.num_tracks
     if len(tracks.log_weights) == num:
-        return density
+        return density if tracks is density.tracks else density.with_fields(tracks=tracks)
     peaks = heaviest_components(tracks.log_weights, tracks.offsets, np.arange(num))
     taken = taken_components(tracks.to_kernel().components, peaks)
     return density.with_fields(tracks=gaussian_tracks(tracks.labels, *taken[1:]))
@@ -251,6 +275,8 @@ def unlabelled_estimate(density: Poisson | IidCluster | MultiBernoulli, step: in
     lighter than 0.2. There are fewer components than targets if all targets are at one position. Existence is the
     remaining weight of the component, at most 1. Ties: the smaller number, then the earlier Bernoulli or component.
     """
+    if getattr(density, "marks", unmarked()).modes.shape[1] > 0:
+        density = _without_modes(density)
     if isinstance(density, MultiBernoulli):
         number = int(np.argmax(cardinality_distribution(density)))
         chosen = np.argsort(-density.existence_logit, kind="stable")[:number]
@@ -266,6 +292,18 @@ def unlabelled_estimate(density: Poisson | IidCluster | MultiBernoulli, step: in
     labels = np.column_stack([np.full(len(components), step), np.arange(len(components))]).astype(np.int64)
     classes = np.exp(density.marks.log_class_probs[components])
     return Estimate(labels, density.means[components], density.covs[components], existence, classes)
+
+
+def _without_modes(density: Any) -> Any:
+    """Return an unlabelled density whose near components of different modes are one."""
+    plain = without_modes(density.to_kernel() if isinstance(density, Poisson) else density._components())
+    if isinstance(density, MultiBernoulli):
+        own = Tracks(np.zeros((len(density.existence_logit), 2), np.int64), for_kernel(density.offsets), plain)
+        _, offsets, plain = reduced_tracks(own, OF_ANY_MODE)
+        density = density.with_fields(offsets=offsets)
+    else:
+        plain = reduce_mixture(plain, OF_ANY_MODE._replace(max_components=len(plain.log_weights) + 2))
+    return density.with_fields(**plain._asdict())
 
 
 def _by_units(weights: Floats, number: int) -> tuple[Ints, Floats]:

@@ -16,12 +16,14 @@ from vedette.errors import InputError, NumericalError, VedetteError
 from vedette.internal.text import pluralise
 from vedette.kernels.base import types as kt
 from vedette.kernels.base.types import Floats, Ints
-from vedette.kernels.gaussian.components import components_of, taken_components
-from vedette.kernels.gaussian.marks import unmarked
+from vedette.kernels.gaussian.components import components_of, taken_components, without_modes
+from vedette.kernels.gaussian.marks import NOT_DRAWN, unmarked
 from vedette.kernels.gaussian.mixtures import heaviest_of_runs
-from vedette.kernels.gaussian.pooling import merged_mixtures
+from vedette.kernels.gaussian.pooling import merged_mixtures, reduced_tracks
+from vedette.kernels.gaussian.reduction import MixtureCaps
 
 UNSCANNED = -2  # replaces a measurement index
+OF_ANY_MODE = MixtureCaps(-math.inf, 2.0, 2**62)  # for components of different modes
 _ARRAYS = kernel_arrays("labels", "offsets", *COMPONENTS)
 
 
@@ -202,6 +204,25 @@ def mixture_moments(log_weights: Floats, means: Floats, covs: Floats) -> tuple[F
     log_weights, means, covs = (np.array(given, np.float64) for given in (log_weights, means, covs))
     merged = merged_mixtures(components_of(log_weights, means, covs), np.array([0, len(log_weights)]))
     return merged.means[0], merged.covs[0]
+
+
+def over_modes(tracks: TrackTable) -> TrackTable:
+    """Return the tracks without modes, so that near components of different ones are one."""
+    if tracks.marks.modes.shape[1] == 0:
+        return tracks
+    given = tracks.to_kernel()
+    plain = without_modes(given.components)
+    return TrackTable.from_kernel(reduced_tracks(given._replace(components=plain), OF_ANY_MODE))
+
+
+def mode_probabilities(tracks: TrackTable) -> Floats:
+    """Return the probability of each mode of each track, (num_tracks, number of modes that occur)."""
+    modes = tracks.marks.modes.reshape(-1)
+    table = np.zeros((tracks.num_tracks, modes.max(initial=NOT_DRAWN) + 1))
+    owner, drawn = np.repeat(np.arange(tracks.num_tracks), np.diff(tracks.offsets)), np.flatnonzero(modes != NOT_DRAWN)
+    if len(drawn):
+        np.add.at(table, (owner[drawn], modes[drawn]), np.exp(tracks.log_weights[drawn]))
+    return table
 
 
 def merged_tracks(tracks: TrackTable) -> kt.Mixture:

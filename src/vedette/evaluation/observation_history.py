@@ -13,11 +13,11 @@ from vedette.errors import InputError
 from vedette.filters import FactoredGlmbFilter
 from vedette.kernels.base.types import Bools, Floats, Mixture
 from vedette.kernels.gaussian.components import components_of, joined_components
-from vedette.kernels.gaussian.prediction import predicted_intensity
+from vedette.kernels.gaussian.modes import predicted_intensity
 from vedette.kernels.steps.undetected import WIDE
 from vedette.models import SensorModel, TargetModel
 from vedette.models.arguments import probability
-from vedette.models.motion import kernel_motion
+from vedette.models.modes import motion_of_filter
 
 # Number of estimates at which a label counts as a birth, and the shape of the prior of the number of births.
 _MIN_ESTIMATES, _SHAPE = 3, 0.5
@@ -65,7 +65,7 @@ class ObservationHistory:
 
     def predict(self, mixture: Mixture, first: int, last: int) -> Mixture:
         """Return a mixture at scan `first`, after survival and motion to scan `last`."""
-        motion = kernel_motion(self.targets.motion, self.targets.survival)
+        motion = motion_of_filter(self.targets.motion, self.targets.survival)
         for scan in range(first + 1, last + 1):
             mixture = predicted_intensity(mixture, motion, self.scan_interval(scan))
         return mixture

@@ -27,11 +27,13 @@ from vedette.kernels.base.types import Ints, Lmb, Measurements, Motion, ScanInpu
 from vedette.models import (
     SensorModel,
     TargetModel,
+    check_room_for_modes,
     constant_detection,
     constant_noise,
-    kernel_motion,
     measurement_space_clutter,
+    motion_of_filter,
     position,
+    sensor_of_filter,
 )
 from vedette.models.arguments import generator, pose_vector, positive, step_number
 from vedette.models.fields import check_fields
@@ -117,6 +119,7 @@ class SingleSensorFilter(WithBirths):
     def __post_init__(self) -> None:
         check_fields(self)
         self.sensor.measurement.check_motion("sensor.measurement", self.targets.motion.components)
+        check_room_for_modes(self.targets.motion, self.limits.max_components)
         object.__setattr__(self, "sensor", with_default_detection_at(self.sensor, self.default_detection_at))
 
     def _inputs_after(
@@ -150,8 +153,8 @@ class SingleSensorFilter(WithBirths):
 @lru_cache(maxsize=1000)
 def _models(targets: TargetModel, sensor: SensorModel, limits: Limits) -> tuple[Motion, Sensor, Truncation]:
     """Return the models in kernel form, cached."""
-    motion = kernel_motion(targets.motion, targets.survival)
-    return motion, sensor.to_kernel(), limits.truncation(sensor.meas_dim)
+    motion = motion_of_filter(targets.motion, targets.survival)
+    return motion, sensor_of_filter(sensor, targets.motion), limits.truncation(sensor.meas_dim)
 
 
 class LabelledFilterBase(WithBirths, ABC, Generic[BeliefT]):

@@ -24,7 +24,7 @@ from vedette.filters.inputs import check_belief, check_scan, is_zero_duration, m
 from vedette.filters.limits import Limits
 from vedette.filters.protocols import FilterInfo
 from vedette.kernels.base.types import Bools, Floats, Ints, Lmb, Measurements, Motion, ScanInput
-from vedette.models import SensorModel, TargetModel, kernel_motion
+from vedette.models import SensorModel, TargetModel, check_room_for_modes, motion_of_filter, sensor_of_filter
 from vedette.models.arguments import generator, one_a_sensor, pose_vector, positive, reject, step_number
 from vedette.models.fields import check_fields
 from vedette.models.sensor import with_default_detection_at
@@ -81,6 +81,7 @@ class MultiSensorFilter(LabelledFilterBase[BeliefT]):
             if not isinstance(sensor, SensorModel):
                 raise InputError(f"sensors[{s}]: expected a SensorModel; got {type(sensor).__name__}")
             sensor.measurement.check_motion(f"sensors[{s}].measurement", self.targets.motion.components)
+        check_room_for_modes(self.targets.motion, self.limits.max_components)
         at = self.default_detection_at
         object.__setattr__(self, "sensors", tuple(with_default_detection_at(sensor, at) for sensor in self.sensors))
 
@@ -128,7 +129,7 @@ class MultiSensorFilter(LabelledFilterBase[BeliefT]):
 
     def _motion(self, dt: float) -> Motion | None:
         """Return the motion in kernel form, or None for scans at the time of the belief."""
-        return kernel_motion(self.targets.motion, self.targets.survival) if dt > 0.0 else None
+        return motion_of_filter(self.targets.motion, self.targets.survival) if dt > 0.0 else None
 
     @abstractmethod
     def _updated(self, prior: Any, born: Lmb, taken: SensorScans, dt: float, place: str) -> tuple[BeliefT, FilterInfo]:
@@ -171,7 +172,7 @@ class SequentialUpdate(MultiSensorFilter[BeliefT]):
         given = zip(taken.names, taken.sensors, taken.sequential_inputs(born, dt), strict=True)
         for s, (name, sensor, scan) in enumerate(given):
             limits = step_limits(self, sensor) if s == last else keeping
-            own = sensor.to_kernel(), limits.truncation(sensor.meas_dim)
+            own = sensor_of_filter(sensor, self.targets.motion), limits.truncation(sensor.meas_dim)
             step = SensorStep((scan, motion if s == 0 else None, *own), limits, sensor, len(taken.names))
             with model_errors():
                 if s in (0, last):  # the last update decides for every label whether it is kept

@@ -17,6 +17,7 @@ from vedette.kernels.steps.multi_sensor_combinations import (
     standing_combinations,
 )
 from vedette.kernels.steps.multi_sensor_lmb import lmb_of_combinations
+from vedette.models import sensor_of_filter
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
@@ -51,9 +52,8 @@ class MultiSensorLmbFilter(LmbFilterBase, MultiSensorFilter[LMB]):
                 combinations = predict_combinations(before, inputs[0], len(inputs), motion)
             for s, (sensor, scan) in enumerate(zip(taken.sensors, inputs, strict=True)):
                 truncation = limits.truncation(sensor.meas_dim)
-                combinations, report = extend_combinations(
-                    combinations, s, num_columns, scan, sensor.to_kernel(), truncation
-                )
+                seen = sensor_of_filter(sensor, self.targets.motion)
+                combinations, report = extend_combinations(combinations, s, num_columns, scan, seen, truncation)
                 num_columns += len(scan.measurements.values)
                 reports.append(report)
             posterior, joint = lmb_of_combinations(combinations, num_columns, truncation, reduction)

@@ -13,14 +13,15 @@ from vedette.densities import LabelledDensity
 from vedette.errors import InputError
 from vedette.fusion.views import FieldsOfView
 from vedette.internal.text import join_alternatives
-from vedette.kernels.base.types import Bools, Floats, Ints, Marks
+from vedette.kernels.base.types import Bools, Floats, Ints
+from vedette.kernels.gaussian.marks import unmarked
 from vedette.kernels.labelled.set_fusion import LOST, SURE
 from vedette.kernels.labelled.validity import is_valid_lmb
 from vedette.models.arguments import real, reject, sequence
 
 # Data type and number of dimensions of the arrays of an LMB: labels, offsets, columns of the components, logits.
 _INT, _FLOAT = np.dtype(np.int64), np.dtype(np.float64)
-_MIXTURE = (_FLOAT, 1), (_FLOAT, 2), (_FLOAT, 3), *((_FLOAT, 2) for _ in Marks._fields)
+_MIXTURE = (_FLOAT, 1), (_FLOAT, 2), (_FLOAT, 3), *((column.dtype, 2) for column in unmarked())
 _FORMS = (_INT, 2), (_INT, 1), (_FLOAT, 1), *_MIXTURE
 
 
@@ -156,6 +157,13 @@ def _has_kernel_arrays(belief: Any) -> bool:
         if type(array) is not np.ndarray or array.dtype != dtype or array.ndim != ndim:
             return False
     return all(len(column) == len(tracks.log_weights) for column in tracks.marks)
+
+
+def refuse_modes(what: str, beliefs: Sequence[LabelledDensity]) -> None:
+    """Raise `InputError` if targets have modes of motion, which a fusion with one Gaussian for each label forgets."""
+    if any(belief.tracks.marks.modes.shape[1] > 0 for belief in beliefs):
+        wanted = "a motion without modes, or sequential, central, GCI or average fusion"
+        raise InputError(f"{what}: expected {wanted}; got tracks with modes of motion")
 
 
 def check_weights(weights: Sequence[float] | Floats) -> tuple[float, ...]:

@@ -16,7 +16,14 @@ from vedette.densities.conversions import marginalised_factors, with_single_gaus
 from vedette.densities.label_sets import WHOLE, in_label_order, join_factors
 from vedette.densities.tracks import places_of
 from vedette.errors import InputError, NumericalError
-from vedette.fusion.base import FusionInfo, LogLinearPool, PrevalidatedBeliefs, check_beliefs, label_fusion_info
+from vedette.fusion.base import (
+    FusionInfo,
+    LogLinearPool,
+    PrevalidatedBeliefs,
+    check_beliefs,
+    label_fusion_info,
+    refuse_modes,
+)
 from vedette.fusion.classes import class_gains, updated_classes
 from vedette.fusion.parallel_sets import (
     check_evidence,
@@ -121,6 +128,7 @@ class ParallelUpdate:
             given = sequence("beliefs", beliefs, "one density a sensor")
         num_sensors = len(given) if self.weights is None else len(self.weights)
         check_beliefs(given, (LMB, FactoredGLMB), num_sensors)
+        refuse_modes("parallel fusion", given)
         if any(belief.state_dim != prediction.state_dim for belief in given):
             raise InputError(f"beliefs: expected states of dimension {prediction.state_dim}, as of views.prediction")
         weights = np.ones(num_sensors) if self.weights is None else np.array(self.weights)

@@ -7,6 +7,7 @@ import numpy as np
 from vedette.densities import LMB, TrackTable
 from vedette.densities.containers import unchecked
 from vedette.densities.tracks import gaussian_tracks, merged_tracks, place_labels, take_tracks
+from vedette.fusion.base import refuse_modes
 from vedette.fusion.classes import class_gains, updated_classes
 from vedette.kernels.base.types import Floats
 from vedette.kernels.labelled.stacking import stack_tracks
@@ -40,6 +41,7 @@ def rebase(posterior: LMB, own: LMB, prediction: LMB) -> LMB:
     """
     if own is prediction:
         return posterior
+    refuse_modes("fusion of late beliefs", (posterior, own, prediction))
     _, means, covs, marks = merged_tracks(prediction.tracks)
     old, new, logits = merged_tracks(own.tracks), merged_tracks(posterior.tracks), prediction.existence_logit.copy()
     _, places = place_labels([belief.tracks.labels for belief in (prediction, own, posterior)])

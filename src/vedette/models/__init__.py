@@ -23,7 +23,9 @@ from vedette.models.heights import (
     position_altitude,
 )
 from vedette.models.kinematics import constant_velocity, constant_velocity_height, coordinated_turn
+from vedette.models.manoeuvres import constant_acceleration, constant_turn, ornstein_uhlenbeck, random_walk
 from vedette.models.measurement import MeasurementModel, NoiseModel, position
+from vedette.models.modes import Modes, check_room_for_modes, motion_of_filter, sensor_of_filter
 from vedette.models.motion import MotionModel, SurvivalModel, constant_survival, kernel_motion
 from vedette.models.noise import axis_noise, constant_noise, range_dependent_noise
 from vedette.models.polar import bearing_only, bearing_range, bearing_range_rate, range_only
@@ -48,6 +50,7 @@ __all__ = [
     "MeasurementBirth",
     "MeasurementModel",
     "ModelFunction",
+    "Modes",
     "MotionModel",
     "NoiseModel",
     "Region",
@@ -66,9 +69,12 @@ __all__ = [
     "bearing_range_rate",
     "bearing_slant_range",
     "camera",
+    "check_room_for_modes",
+    "constant_acceleration",
     "constant_detection",
     "constant_noise",
     "constant_survival",
+    "constant_turn",
     "constant_velocity",
     "constant_velocity_height",
     "coordinated_turn",
@@ -78,10 +84,14 @@ __all__ = [
     "limited_sector",
     "measurement_space_clutter",
     "model_function",
+    "motion_of_filter",
+    "ornstein_uhlenbeck",
     "position",
     "position_altitude",
+    "random_walk",
     "range_dependent_noise",
     "range_only",
     "region_clutter",
+    "sensor_of_filter",
     "soft_sector",
 ]

@@ -23,7 +23,7 @@ _SERIES_ANGLE = 0.1
 
 
 @inlined
-def _acceleration_cov(dt: float, sigma_v: float, out: Floats) -> None:
+def acceleration_cov(dt: float, sigma_v: float, out: Floats) -> None:
     """Write the covariance of positions and velocities for an acceleration constant within the step, zero elsewhere."""
     variance = sigma_v * sigma_v
     for i in range(out.shape[0]):
@@ -37,7 +37,8 @@ def _acceleration_cov(dt: float, sigma_v: float, out: Floats) -> None:
 
 
 @inlined
-def _identity(out: Floats) -> None:
+def identity(out: Floats) -> None:
+    """Write the identity matrix."""
     for i in range(out.shape[0]):
         for j in range(out.shape[1]):
             out[i, j] = 1.0 if i == j else 0.0
@@ -53,14 +54,14 @@ def _cv_transition(state: Floats, dt: float, params: Floats, out: Floats) -> Non
 
 @model_function("transition_jacobian")
 def _cv_jacobian(state: Floats, dt: float, params: Floats, out: Floats) -> None:
-    _identity(out)
+    identity(out)
     out[0, 2] = dt
     out[1, 3] = dt
 
 
 @model_function("process_noise_cov")
 def _cv_noise(state: Floats, dt: float, params: Floats, out: Floats) -> None:
-    _acceleration_cov(dt, params[0], out)
+    acceleration_cov(dt, params[0], out)
 
 
 @model_function("process_noise_cov")
@@ -116,7 +117,7 @@ def _cv_height_transition(state: Floats, dt: float, params: Floats, out: Floats)
 
 @model_function("transition_jacobian")
 def _cv_height_jacobian(state: Floats, dt: float, params: Floats, out: Floats) -> None:
-    _identity(out)
+    identity(out)
     out[0, 2] = dt
     out[1, 3] = dt
     out[4, 5] = dt
@@ -203,7 +204,7 @@ def _ct_jacobian(state: Floats, dt: float, params: Floats, out: Floats) -> None:
     sine, cosine = math.sin(angle), math.cos(angle)
     along, across = dt * _along(angle), dt * _across(angle)
     along_rate, across_rate = dt * dt * _along_slope(angle), dt * dt * _across_slope(angle)
-    _identity(out)
+    identity(out)
     out[0, 2] = along
     out[0, 3] = -across
     out[0, 4] = along_rate * state[2] - across_rate * state[3]
@@ -220,7 +221,7 @@ def _ct_jacobian(state: Floats, dt: float, params: Floats, out: Floats) -> None:
 
 @model_function("process_noise_cov")
 def _ct_noise(state: Floats, dt: float, params: Floats, out: Floats) -> None:
-    _acceleration_cov(dt, params[0], out)
+    acceleration_cov(dt, params[0], out)
     out[4, 4] = (dt * params[1]) ** 2
 
 

@@ -9,13 +9,14 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from vedette.errors import ModelError
-from vedette.kernels.base.types import PLANE, VELOCITY, VX, VY, Floats, Motion
+from vedette.kernels.base.types import PLANE, VELOCITY, VX, VY, Floats, Motion, Switching
 from vedette.kernels.gaussian.sigma_points import CUBATURE, LINEARISED, SWITCHED, UNSCENTED
 from vedette.models.arguments import dimension, one_of, params_vector, positive, probability, real, reject, state_table
 from vedette.models.fields import Positive, Probability, part
 from vedette.models.functions import ModelFunction, model_function, numbers_at, require_kind, write_rows
 from vedette.models.probe import probe_array, probe_covariance, probe_jacobian, probe_probability
 
+_ONE_MODE = Switching(np.zeros((1, 1)), np.ones(1), np.inf)
 _BRIEF = 1e-3  # s, in which the direction of a velocity hardly changes
 METHODS = {"ekf": LINEARISED, "ukf": UNSCENTED, "ckf": CUBATURE}
 
@@ -187,9 +188,10 @@ def kernel_motion(motion: MotionModel, survival: SurvivalModel) -> Motion:
         _no_transition_jacobian if jacobian is None else jacobian,
         motion.process_noise_cov,
         survival.function,
-        motion.transition_params,
-        motion.noise_params,
+        motion.transition_params[np.newaxis],
+        motion.noise_params[np.newaxis],
         survival.params,
+        _ONE_MODE,
         resolve_method("MotionModel.method", motion.method, jacobian is not None),
     )
 

@@ -35,6 +35,7 @@ def _no_mean_detection(mean: Floats, cov: Floats, pose: Floats, params: Floats) 
 
 _NODES = spread_nodes()
 _NO_NODES = np.empty((0, 3))
+_NO_FACTORS = np.empty(0)
 
 _PARTS: dict[str, type] = {
     "measurement": MeasurementModel,
@@ -177,4 +178,5 @@ def _bundle_of(model: SensorModel, rule: int) -> Sensor:
         model.measurement.height,
         rule,
         _NO_NODES if rule == AT_CENTRE else _NODES,
+        _NO_FACTORS,
     )

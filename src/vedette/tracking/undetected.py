@@ -11,7 +11,8 @@ import numpy as np
 from vedette.densities import UndetectedIntensity
 from vedette.errors import InputError
 from vedette.kernels.base.types import Floats
-from vedette.kernels.steps.undetected import survival_probabilities, take_out_detected
+from vedette.kernels.gaussian.prediction import survival_probabilities
+from vedette.kernels.steps.undetected import take_out_detected
 from vedette.models import SensorModel, UndetectedModel, kernel_motion
 from vedette.models.arguments import float_array, reject
 from vedette.tracking.base import StageTimer, State, TrackerInfo, TrackerWrapper

@@ -20,14 +20,14 @@ from vedette.kernels.association.assignment import ABSENT, Options
 from vedette.kernels.association.gating import near_measurements
 from vedette.kernels.association.joined_rows import copy_entry
 from vedette.kernels.association.options import Sight, make_room, room_for_updated, sort_row, weigh_detection
-from vedette.kernels.association.predicted import Rows, log_or_minus_inf, make_rows, rows_of_scan
+from vedette.kernels.association.predicted import Rows, make_rows, rows_of_scan
 from vedette.kernels.base.arrays import counted_ints, group_members
 from vedette.kernels.base.compile import borrowing, kernel
 from vedette.kernels.base.types import Floats, Ints, Mixture, ScanInput, Sensor, Tracks
 from vedette.kernels.gaussian.components import components_like, copy_component
 from vedette.kernels.gaussian.detection import moments_if_missed
 from vedette.kernels.gaussian.innovation import copy_innovation
-from vedette.kernels.gaussian.linalg import log_add
+from vedette.kernels.gaussian.linalg import log_add, log_or_minus_inf
 from vedette.kernels.gaussian.marks import room_for_updated_marks
 from vedette.kernels.gaussian.relinearisation import make_pair_work
 

@@ -11,7 +11,7 @@ from vedette.kernels.base.arrays import grown_floats, grown_ints
 from vedette.kernels.base.compile import inlined, kernel
 from vedette.kernels.gaussian.components import copy_components
 from vedette.kernels.gaussian.innovation import copy_innovation
-from vedette.kernels.gaussian.marks import copy_marks, marks_like
+from vedette.kernels.gaussian.marks import copy_updated_marks, marks_like
 
 
 @kernel
@@ -63,7 +63,7 @@ def copy_entry(source: Options, entry: int, out: Options, at: int) -> None:
     """Copy residual and marks of an entry, and its updated moments if both have components that bend."""
     for a in range(source.whitened.shape[1]):
         out.whitened[at, a] = source.whitened[entry, a]
-    copy_marks(source.marks, entry, out.marks, at)
+    copy_updated_marks(source.marks, entry, out.marks, at)
     if source.updated.shape[0] > 0 and out.updated.shape[0] > 0:
         for i in range(source.updated.shape[1]):
             for j in range(source.updated.shape[2]):

@@ -13,12 +13,13 @@ import numpy as np
 from vedette.errors import ModelError
 from vedette.kernels.association.assignment import ABSENT, MISSED, Options, borrowed_options
 from vedette.kernels.association.gating import Near, near_measurements
-from vedette.kernels.association.predicted import Rows, log_or_minus_inf
+from vedette.kernels.association.predicted import Rows
 from vedette.kernels.association.truncation import Truncation
 from vedette.kernels.base.compile import borrowing, inlined, kernel
 from vedette.kernels.base.types import Floats, Ints, Marks, Measurements, ScanInput, Sensor
 from vedette.kernels.gaussian.detection import detection_probability, moments_if_missed
 from vedette.kernels.gaussian.innovation import copy_innovation, whiten, write_posterior
+from vedette.kernels.gaussian.linalg import log_or_minus_inf
 from vedette.kernels.gaussian.marks import no_marks, room_for_updated_marks, update_marks
 from vedette.kernels.gaussian.relinearisation import Pair, PairWork, make_pair_work, update_pair
 from vedette.kernels.gaussian.row_noise import bring_noise, log_likelihood_ratio, mark_missing, noise_of_row

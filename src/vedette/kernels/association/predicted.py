@@ -16,7 +16,9 @@ from vedette.kernels.base.compile import borrowing, inlined, kernel
 from vedette.kernels.base.types import Floats, Ints, Lmb, Mixture, Motion, ScanInput, Sensor, Tracks
 from vedette.kernels.gaussian.components import borrowed_components, components_like, copy_component, copy_components
 from vedette.kernels.gaussian.innovation import Innovation, expect, make_innovation
-from vedette.kernels.gaussian.linalg import log_add
+from vedette.kernels.gaussian.linalg import log_add, log_or_minus_inf
+from vedette.kernels.gaussian.marks import mode_of
+from vedette.kernels.gaussian.modes import branched_tracks
 from vedette.kernels.gaussian.prediction import predict
 from vedette.kernels.gaussian.row_noise import bring_noise
 from vedette.kernels.gaussian.scratch import Scratch, make_scratch
@@ -30,11 +32,6 @@ class Rows(NamedTuple):
     log_absent: Floats  # (num_rows,) log probability of absence
     components: Mixture  # predicted; log weights of the mixture times the probability of presence
     innovation: Innovation
-
-
-@inlined
-def log_or_minus_inf(value: float) -> float:
-    return math.log(value) if value > 0.0 else -math.inf
 
 
 @kernel
@@ -72,7 +69,7 @@ def fill_survivors(tracks: Tracks, motion: Motion, dt: float, rows: Rows, scratc
             absent += math.exp(components.log_weights[c]) * (1.0 - survival)
             copy_component(components, c, out, c)
             out.log_weights[c] += log_or_minus_inf(survival)
-            predict(motion, dt, mean, components.covs[c], out.means[c], out.covs[c], scratch)
+            predict(motion, 0, dt, mean, components.covs[c], out.means[c], out.covs[c], scratch)
         rows.log_absent[i] = log_or_minus_inf(absent)
         rows.labels[i, 0], rows.labels[i, 1] = tracks.labels[i, 0], tracks.labels[i, 1]
         rows.offsets[i + 1] = tracks.offsets[i + 1]
@@ -101,10 +98,14 @@ def expect_rows(sensor: Sensor, scan: ScanInput, rows: Rows, scratch: Scratch) -
 
     If its rows bring noise of their own, each has an update of its own, as for a component over which the sensor bends.
     """
-    components, by_pair = rows.components, bring_noise(scan.measurements)
+    components, seen, by_pair = rows.components, rows.innovation, bring_noise(scan.measurements)
     for c in range(len(components.log_weights)):
-        expect(sensor, scan.pose, components.means[c], components.covs[c], c, rows.innovation, scratch)
-        rows.innovation.bends[c] = rows.innovation.bends[c] or by_pair
+        expect(sensor, scan.pose, components.means[c], components.covs[c], c, seen, scratch)
+        seen.bends[c] = seen.bends[c] or by_pair
+        mode = mode_of(components.marks, c)
+        if mode >= 0 and len(sensor.mode_factors) > 0 and sensor.mode_factors[mode] < 1.0:
+            seen.prob_detection[c] *= sensor.mode_factors[mode]
+            seen.at_edge[c] = False
 
 
 @inlined
@@ -130,6 +131,10 @@ def rows_of_scan(tracks: Tracks, scan: ScanInput, motion: Motion | None, sensor:
         standing = standing_rows(tracks, meas_dim)
         expect_rows(sensor, scan, standing, make_scratch(state_dim, meas_dim))
         return standing
+    if len(motion.transition_params) > 1:
+        branched = branched_rows(tracks, scan, motion, meas_dim)
+        expect_rows(sensor, scan, branched, make_scratch(state_dim, meas_dim))
+        return branched
     # Every component has its innovation here once, for any number of hypotheses with its track.
     num_rows = len(tracks.labels) + len(sites.labels)
     num_components = len(tracks.components.log_weights) + len(sites.components.log_weights)
@@ -143,8 +148,28 @@ def standing_rows(tracks: Tracks, meas_dim: int) -> Rows:
     """Return the tracks unchanged as rows: no births, deaths or motion, each surely present, without `expect_rows`."""
     num = len(tracks.components.log_weights)
     rows = make_rows(len(tracks.labels), num, tracks.components, meas_dim)
+    _copy_tracks(tracks, rows)
+    rows.log_absent[:] = -math.inf
+    return rows
+
+
+@kernel
+def branched_rows(tracks: Tracks, scan: ScanInput, motion: Motion, meas_dim: int) -> Rows:
+    """Return the rows of a scan, without `expect_rows`, of targets that change their mode of motion."""
+    moved, log_dead = branched_tracks(tracks, motion, scan.dt)
+    sites, num = scan.birth.tracks, len(tracks.labels)
+    num_components = len(moved.components.log_weights) + len(sites.components.log_weights)
+    rows = make_rows(num + len(sites.labels), num_components, moved.components, meas_dim)
+    _copy_tracks(moved, rows)
+    rows.log_absent[:num] = log_dead
+    fill_births(scan.birth, num, rows)
+    return rows
+
+
+@borrowing
+def _copy_tracks(tracks: Tracks, rows: Rows) -> None:
+    """Write the labels and components of tracks to the first rows."""
     for i in range(len(tracks.labels)):
         rows.labels[i, 0], rows.labels[i, 1] = tracks.labels[i, 0], tracks.labels[i, 1]
-        rows.log_absent[i], rows.offsets[i + 1] = -math.inf, tracks.offsets[i + 1]
-    copy_components(tracks.components, 0, num, rows.components, 0)
-    return rows
+        rows.offsets[i + 1] = tracks.offsets[i + 1]
+    copy_components(tracks.components, 0, len(tracks.components.log_weights), rows.components, 0)

@@ -5,7 +5,7 @@ Ragged data is flat with offsets (CSR): the entries of item `i` are `offsets[i]:
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -24,6 +24,10 @@ STATE_COMPONENTS = {
     "constant_velocity": PLANE,
     "coordinated_turn": (*PLANE, "turn_rate"),
     "constant_velocity_height": (*PLANE, HEIGHT, CLIMB),
+    "constant_turn": PLANE,
+    "constant_acceleration": (*PLANE, "ax", "ay"),
+    "ornstein_uhlenbeck": PLANE,
+    "random_walk": PLANE[:2],
 }
 
 # Components of a pose have fixed places. A shorter pose lacks the last ones.
@@ -41,6 +45,12 @@ def place_of(name: str, components: Sequence[str]) -> int:
     return components.index(name) if name in components else -1
 
 
+def common_components(states: Iterable[Sequence[str]]) -> tuple[str, ...]:
+    """Return the components that at least one kind of state has: position and velocity first, then others in order."""
+    found = dict.fromkeys(name for components in states for name in components)
+    return (*(name for name in PLANE if name in found), *(name for name in found if name not in PLANE))
+
+
 class Marks(NamedTuple):
     """Optional columns of Gaussian components. A column that is not in use has no width.
 
@@ -49,6 +59,7 @@ class Marks(NamedTuple):
     """
 
     log_class_probs: Floats  # (num, num_classes) log probability of each class of target
+    modes: Ints  # (num, 1) mode of motion, or -1: not drawn yet, as at birth. (num, 0): not drawn yet anywhere
 
 
 class Mixture(NamedTuple):
@@ -95,16 +106,25 @@ class FactoredGlmb(NamedTuple):
     factor_offsets: Ints  # (num_factors + 1,) into the hypotheses
 
 
+class Switching(NamedTuple):
+    """Changes of the mode of motion of a target: a Markov chain in continuous time."""
+
+    rates: Floats  # (num_modes, num_modes) of the changes from row to column, 1/s; rows sum to 0
+    at_birth: Floats  # (num_modes,) probabilities of the mode of a target that was born
+    merge_distance: float  # within which predicted components of one mode merge; inf: all of them
+
+
 class Motion(NamedTuple):
-    """Motion and survival functions with their parameter vectors."""
+    """Motion and survival functions with their parameters, the first two with a row for each mode of motion."""
 
     transition: Any
     transition_jacobian: Any
     process_noise_cov: Any
     prob_survival: Any
-    transition_params: Floats
-    noise_params: Floats
+    transition_params: Floats  # (num_modes, k)
+    noise_params: Floats  # (num_modes, l)
     survival_params: Floats
+    switching: Switching
     method: int  # LINEARISED, UNSCENTED or CUBATURE of `vedette.kernels.gaussian.sigma_points`
 
 
@@ -126,6 +146,7 @@ class Sensor(NamedTuple):
     height: int  # place in states of the height that the measurement depends on, or -1
     detection_rule: int  # AT_CENTRE, CLOSED_FORM, BY_NODES or AT_EDGES of `vedette.kernels.gaussian.detection`
     detection_nodes: Floats  # (num, 3) weight and two standard deviates per node; empty for AT_CENTRE
+    mode_factors: Floats  # (num_modes,) on the probability of detection; empty: none
 
 
 class Measurements(NamedTuple):

@@ -16,6 +16,7 @@ from vedette.kernels.gaussian.marks import (
     joined_marks,
     marks_between,
     marks_like,
+    marks_like_both,
     merge_marks,
     taken_marks,
     unmarked,
@@ -98,7 +99,8 @@ def grown_components(mixture: Mixture, filled: int, needed: int) -> Mixture:
 def stacked_mixtures(first: Mixture, second: Mixture) -> Mixture:
     """The components of both, in their order."""
     num, more = len(first.log_weights), len(second.log_weights)
-    out = components_like(first, num + more)
+    n, marks = first.means.shape[1], marks_like_both(first.marks, second.marks, num + more)
+    out = Mixture(np.empty(num + more), np.empty((num + more, n)), np.empty((num + more, n, n)), marks)
     copy_components(first, 0, num, out, 0)
     copy_components(second, 0, more, out, num)
     return out
@@ -130,6 +132,11 @@ def merge_all(
 def components_of(log_weights: Floats, means: Floats, covs: Floats, marks: Marks | None = None) -> Mixture:
     """New components of these weights, moments and marks. None: no column in use."""
     return Mixture(log_weights, means, covs, unmarked(len(log_weights)) if marks is None else marks)
+
+
+def without_modes(mixture: Mixture) -> Mixture:
+    """The components without the column of modes."""
+    return mixture._replace(marks=mixture.marks._replace(modes=unmarked(len(mixture.log_weights)).modes))
 
 
 def taken_components(mixture: Mixture, places: Ints | slice) -> Mixture:

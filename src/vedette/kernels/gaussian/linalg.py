@@ -124,6 +124,11 @@ def log_add(a: float, b: float) -> float:
     return a + math.log1p(math.exp(b - a))
 
 
+@inlined
+def log_or_minus_inf(value: float) -> float:
+    return math.log(value) if value > 0.0 else -math.inf
+
+
 @borrowing
 def normalise_logs(values: Floats) -> float:
     """Make the exponentials sum to one and return the log of their sum, or -inf, without a change, for no values.

@@ -18,7 +18,7 @@ from vedette.kernels.gaussian.components import (
     own_components,
 )
 from vedette.kernels.gaussian.linalg import cholesky, log_det_from_factor, log_sum, solve_lower
-from vedette.kernels.gaussian.marks import may_merge
+from vedette.kernels.gaussian.marks import has_room, may_merge, most_kept
 from vedette.kernels.gaussian.mixtures import sort_descending
 
 # Twice the Kullback-Leibler divergence up to which components of an intensity are merged, and the factor by which this
@@ -32,7 +32,7 @@ class MixtureCaps(NamedTuple):
 
     log_min_weight: float  # components below this, relative to the mixture's total weight, are dropped
     merge_distance: float  # Mahalanobis distance within which components are merged; 0 merges none
-    max_components: int  # kept; 1 is one Gaussian of the moments of all components, the light ones too
+    max_components: int  # kept of each mode; 1 is one Gaussian of the moments of all components, the light ones too
 
 
 class ReductionWork(NamedTuple):
@@ -148,7 +148,7 @@ def reduce_into(wide: Mixture, width: int, caps: MixtureCaps, work: ReductionWor
     """Append the first `width` components within the caps, heaviest first, total weight kept. Return the new end.
 
     Light components are dropped. Then, greedily from the heaviest, all components within the merging distance of it
-    (under its covariance) are merged by moment matching. Then the heaviest stay.
+    (under its covariance) are merged by moment matching. Then the heaviest of each mode stay.
     """
     total = log_sum(wide.log_weights[:width])
     if caps.max_components == 1 or width <= 1 or total == -math.inf:
@@ -159,9 +159,11 @@ def reduce_into(wide: Mixture, width: int, caps: MixtureCaps, work: ReductionWor
     reach = caps.merge_distance * caps.merge_distance
     num_merged = _merge(wide, width, total + caps.log_min_weight, reach, False, work)
     sort_descending(work.merged.log_weights, num_merged, work.order, work.buffer)
-    kept = min(num_merged, caps.max_components)
-    for k in range(kept):
-        copy_component(work.merged, work.order[k], out, filled + k)
+    kept = 0
+    for k in range(num_merged):
+        if has_room(work.merged.marks, work.order, k, caps.max_components):
+            copy_component(work.merged, work.order[k], out, filled + kept)
+            kept += 1
     # What was dropped is shared out, so that reducing does not lose a target.
     shift = total - log_sum(out.log_weights[filled : filled + kept])
     for k in range(kept):
@@ -173,8 +175,7 @@ def reduce_into(wide: Mixture, width: int, caps: MixtureCaps, work: ReductionWor
 def reduce_mixture(mixture: Mixture, caps: MixtureCaps) -> Mixture:
     """The reduced mixture, see `reduce_into`, in new arrays."""
     num = len(mixture.log_weights)
-    most = min(num, max(1, caps.max_components))
-    out = components_like(mixture, most)
+    out = components_like(mixture, most_kept(mixture.marks, num, caps.max_components))
     last = reduce_into(mixture, num, caps, make_reduction_work(num, mixture), out, 0)
     return components_between(out, 0, last)
 

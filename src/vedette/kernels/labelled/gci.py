@@ -18,7 +18,7 @@ from vedette.kernels.base.types import Floats, Ints, Marks, Mixture, Tracks
 from vedette.kernels.gaussian.components import components_like
 from vedette.kernels.gaussian.information import log_integral, log_value, row_size, to_information, to_moments
 from vedette.kernels.gaussian.linalg import cholesky, log_add, normalise_logs
-from vedette.kernels.gaussian.marks import pool_marks
+from vedette.kernels.gaussian.marks import may_pool, mode_of, pool_marks
 from vedette.kernels.gaussian.mixtures import require_gaussians
 from vedette.kernels.gaussian.pooling import reduced_tracks
 from vedette.kernels.gaussian.reduction import MixtureCaps
@@ -119,14 +119,16 @@ def _multiply(marks: Marks, powers: Powers, low: int, high: int, out: Mixture) -
 
 
 @kernel
-def _log_ratio(powers: Powers) -> float:
-    """Return log (f / q) at reference + `powers.offset`."""
+def _log_ratio(marks: Marks, mode: int, powers: Powers) -> float:
+    """Return log (f / q) of a mode at reference + `powers.offset`."""
     ratio = 0.0
     for s in range(len(powers.weights)):
         weight, log_power, log_sum_of_powers = powers.weights[s], -math.inf, -math.inf
         if weight == 0.0 or powers.starts[s + 1] - powers.starts[s] == 1:
             continue
         for component in range(powers.starts[s], powers.starts[s + 1]):
+            if not may_pool(marks, powers.sources[component], mode):
+                continue
             value = powers.log_weights[component] + log_value(powers.rows[component], powers.offset)
             log_power = log_add(log_power, value / weight)
             log_sum_of_powers = log_add(log_sum_of_powers, value)
@@ -135,9 +137,9 @@ def _log_ratio(powers: Powers) -> float:
 
 
 @kernel
-def _correct(powers: Powers, points: Floats, point_weights: Floats, mean: Floats, cov: Floats) -> float:
-    """Give a Gaussian of q the moments of f / q times it, by cubature, and return the log of the retained mass."""
-    dim, num = len(mean), len(points)
+def _correct(marks: Marks, powers: Powers, points: Floats, point_weights: Floats, c: int, out: Mixture) -> float:
+    """Give Gaussian `c` of q the moments of f / q times it, by cubature, and return the log of the retained mass."""
+    (num, dim), mean, cov, mode = points.shape, out.means[c], out.covs[c], mode_of(out.marks, c)
     offset, images, masses, total = powers.offset, np.empty((num, dim)), np.empty(num), 0.0
     if not cholesky(cov, powers.factor):
         raise FloatingPointError("the product of the track densities of a label is not integrable")
@@ -148,7 +150,7 @@ def _correct(powers: Powers, points: Floats, point_weights: Floats, mean: Floats
                 images[p, i] += powers.factor[i, j] * points[p, j]
             offset[i] = mean[i] - powers.reference[i] + images[p, i]
         # f / q is at most 1, so that no distant point can dominate.
-        masses[p] = point_weights[p] * math.exp(_log_ratio(powers))
+        masses[p] = point_weights[p] * math.exp(_log_ratio(marks, mode, powers))
         total += masses[p]
     for i in range(dim):
         offset[i] = 0.0
@@ -205,8 +207,8 @@ def fuse_tracks(
         _load(chosen, item, fusion_weights, tracks, powers)
         _multiply(tracks.components.marks, powers, low, high, out)
         for c in range(low, high):
-            if high - low > 1 and len(points) > 0:
-                out.log_weights[c] += _correct(powers, points, point_weights, out.means[c], out.covs[c])
+            if high - low > 1 and len(points) > 0 and out.log_weights[c] > -math.inf:
+                out.log_weights[c] += _correct(tracks.components.marks, powers, points, point_weights, c, out)
         log_overlaps[item] = normalise_logs(out.log_weights[low:high])
     require_gaussians(out.means, out.covs)
     return offsets, out, log_overlaps

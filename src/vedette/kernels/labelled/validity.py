@@ -10,8 +10,8 @@ import math
 
 import numpy as np
 
-from vedette.kernels.base.compile import kernel
-from vedette.kernels.base.types import Floats, Glmb, Ints, Lmb, Tracks
+from vedette.kernels.base.compile import inlined, kernel
+from vedette.kernels.base.types import Floats, Glmb, Ints, Lmb, Marks, Tracks
 from vedette.kernels.gaussian.linalg import cholesky, log_sum
 
 _TOLERANCE = 0.5e-9  # of the log of sums that must be 1, and of symmetry, relative to the largest variance
@@ -62,6 +62,11 @@ def _is_gaussian(mean: Floats, cov: Floats, factor: Floats) -> bool:
     return is_far_from_singular
 
 
+@inlined
+def _have_rows(marks: Marks, num: int) -> bool:
+    return len(marks.log_class_probs) == num and len(marks.modes) == num
+
+
 @kernel
 def _are_mixtures(tracks: Tracks) -> bool:
     """Return True if every track is a density."""
@@ -69,7 +74,7 @@ def _are_mixtures(tracks: Tracks) -> bool:
     num, (num_components, dim) = len(tracks.labels), means.shape
     if tracks.labels.shape[1] != 2 or dim == 0 or len(log_weights) != num_components:
         return False
-    if covs.shape != (num_components, dim, dim) or len(marks.log_class_probs) != num_components:
+    if covs.shape != (num_components, dim, dim) or not _have_rows(marks, num_components):
         return False
     if not _cuts(tracks.offsets, num, num_components, 1):
         return False

@@ -136,6 +136,6 @@ def predict_batch(
     for s in range(num):
         take_state(means, s, work.mean)
         take_matrix(covs, s, work.cov)
-        predict(motion, dt, work.mean, work.cov, work.out_mean, work.out_cov, work.scratch)
+        predict(motion, 0, dt, work.mean, work.cov, work.out_mean, work.out_cov, work.scratch)
         put_state(work.out_mean, s, batch.means)
         put_matrix(work.out_cov, s, batch.covs)

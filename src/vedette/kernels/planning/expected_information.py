@@ -173,7 +173,7 @@ def _expected_cov(
         mean, cov, detection = paths.means[label, h], paths.covs[label, h], detections[h]
         if was_seen:
             before, cov = paths.means[label, h - 1], work.cov
-            predict(decision.motion, horizon.dt, before, out, work.predicted_mean, cov, work.scratch)
+            predict(decision.motion, 0, horizon.dt, before, out, work.predicted_mean, cov, work.scratch)
         missed += log_miss(detection)
         if detection < least:
             if was_seen:

@@ -38,7 +38,7 @@ def propagate_samples(motion: Motion, states: Floats, dt: float, horizon_steps: 
         for i in range(num):
             # Without process noise: the spread of the trajectories is that of the samples.
             before = states[i] if h == 0 else out[h - 1, i]
-            motion.transition(before, dt, motion.transition_params, out[h, i])
+            motion.transition(before, dt, motion.transition_params[0], out[h, i])
     return out
 
 

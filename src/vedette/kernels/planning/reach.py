@@ -41,7 +41,7 @@ def predict_paths(motion: Motion, dt: float, num_steps: int, means: Floats, covs
         for h in range(num_steps):
             mean = means[i] if h == 0 else paths.means[i, h - 1]
             cov = covs[i] if h == 0 else paths.covs[i, h - 1]
-            predict(motion, dt, mean, cov, paths.means[i, h], paths.covs[i, h], scratch)
+            predict(motion, 0, dt, mean, cov, paths.means[i, h], paths.covs[i, h], scratch)
     return paths
 
 

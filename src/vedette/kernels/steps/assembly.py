@@ -15,7 +15,7 @@ from vedette.kernels.base.types import Glmb, Ints, Mixture, Tracks
 from vedette.kernels.gaussian.components import components_between, components_like, copy_component, copy_gaussian
 from vedette.kernels.gaussian.innovation import update_mean
 from vedette.kernels.gaussian.linalg import normalise_logs
-from vedette.kernels.gaussian.marks import copy_marks
+from vedette.kernels.gaussian.marks import copy_updated_marks
 from vedette.kernels.gaussian.relinearisation import copy_updated
 
 
@@ -53,7 +53,7 @@ def write_updated(row: int, option: int, rows: Rows, options: Options, start: in
             copy_gaussian(predicted.means, rows.innovation.covs, c, out.means, out.covs, start)
             update_mean(rows.innovation, c, options.whitened[entry + i], predicted.means[c], out.means[start])
         if detected:
-            copy_marks(options.marks, entry + i, out.marks, start)
+            copy_updated_marks(options.marks, entry + i, out.marks, start)
         start += 1
     return start
 

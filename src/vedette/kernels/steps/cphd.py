@@ -166,9 +166,8 @@ def _log_mean(log_cardinality: Floats) -> float:
 
 
 @kernel
-def _predict(log_cardinality: Floats, prior: Mixture, birth: Lmb, rows_log_weights: Floats, log_died: float) -> Floats:
-    """Return the predicted cardinality, and scale the row's weights, with survivors of one target, to sum to one."""
-    num = len(prior.log_weights)
+def _predict(log_cardinality: Floats, num: int, birth: Lmb, rows_log_weights: Floats, log_died: float) -> Floats:
+    """Return the predicted cardinality, and scale the row's weights, the first `num` of one target, to sum to one."""
     predicted = predict_cardinality(log_cardinality, log_sum(rows_log_weights[:num]), log_died, birth.existence_logit)
     log_prior_mean = _log_mean(log_cardinality)
     for c in range(num):
@@ -214,8 +213,8 @@ def step_cphd(
     prior: the density of one target, weights that sum to one. If no number of targets explains the scan, the log total
     of the report is -inf and the prior is returned.
     """
-    rows, log_died = predict_intensity(prior, scan, motion, sensor)
-    predicted = _predict(log_cardinality, prior, scan.birth, rows.components.log_weights, log_died)
+    rows, log_died, num_surviving = predict_intensity(prior, scan, motion, sensor)
+    predicted = _predict(log_cardinality, num_surviving, scan.birth, rows.components.log_weights, log_died)
     options, log_clutter, num_raised = weighed_options(rows, scan, sensor, truncation)
     num_options = options.offsets[1]
     detections = _detections(options.columns[:num_options])

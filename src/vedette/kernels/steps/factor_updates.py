@@ -9,7 +9,7 @@ import numpy as np
 
 from vedette.kernels.association.assignment import ABSENT, Options
 from vedette.kernels.association.children import Children, make_children
-from vedette.kernels.association.predicted import Rows, log_or_minus_inf
+from vedette.kernels.association.predicted import Rows
 from vedette.kernels.association.ranked import Ranking, ranked
 from vedette.kernels.association.search import make_search
 from vedette.kernels.association.totals import ROUNDING, log_heaviest_left, log_weight_bound
@@ -17,10 +17,10 @@ from vedette.kernels.association.truncation import Truncation
 from vedette.kernels.base.arrays import filled_ints
 from vedette.kernels.base.compile import borrowing, kernel
 from vedette.kernels.base.types import Floats, Glmb, Ints, Mixture
-from vedette.kernels.gaussian.components import components_between, components_like, copy_component
+from vedette.kernels.gaussian.components import components_between, components_like, copy_component, merge_all
 from vedette.kernels.gaussian.distances import reduction_bound
-from vedette.kernels.gaussian.linalg import log_add, log_sum
-from vedette.kernels.gaussian.reduction import MixtureCaps, ReductionWork, make_reduction_work, reduce_into
+from vedette.kernels.gaussian.linalg import log_add, log_or_minus_inf, log_sum
+from vedette.kernels.gaussian.reduction import MixtureCaps, ReductionWork, make_reduction_work
 from vedette.kernels.labelled.established_labels import with_established_labels
 from vedette.kernels.labelled.factor_store import FactorStore, append_part, append_single, next_component, with_room
 from vedette.kernels.labelled.splitting import Choices, choices_of, independent_parts
@@ -116,8 +116,7 @@ def _append_mixture(
     start, caps = next_component(store), reduction.mixture
     if logit < reduction.min_existence_logit:
         k, faint = work.num_faint[0], work.faint
-        one = MixtureCaps(caps.log_min_weight, caps.merge_distance, 1)
-        reduce_into(wide, width, one, reducing, faint, k)
+        merge_all(wide, width, reducing.near, reducing.weights, 0.0, faint, k)
         if not outweighs_undetected(existence, faint.means[k], faint.covs[k], work.background):
             faint.log_weights[k] = log_or_minus_inf(existence)
             work.sums[DROPPED] += existence

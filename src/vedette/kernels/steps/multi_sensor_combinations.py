@@ -16,6 +16,7 @@ from vedette.kernels.association.assignment import MISSED, Options
 from vedette.kernels.association.options import weighed_options
 from vedette.kernels.association.predicted import (
     Rows,
+    branched_rows,
     expect_rows,
     fill_births,
     fill_survivors,
@@ -73,6 +74,8 @@ def _one_each(prior: Lmb, rows: Rows, num_sensors: int) -> Combinations:
 def predict_combinations(prior: Lmb, scan: ScanInput, num_sensors: int, motion: Motion) -> Combinations:
     """Return one combination per predicted track or birth site, before the first sensor, without using measurements."""
     birth = scan.birth
+    if len(motion.transition_params) > 1:
+        return _one_each(prior, branched_rows(prior.tracks, scan, motion, 0), num_sensors)
     num_tracks, num_births = len(prior.tracks.labels), len(birth.tracks.labels)
     num, dim = num_tracks + num_births, prior.tracks.components.means.shape[1]
     own = prior.tracks.components

@@ -34,9 +34,12 @@ class IntensityReport(NamedTuple):
 
 
 @kernel
-def predict_intensity(prior: Mixture, scan: ScanInput, motion: Motion | None, sensor: Sensor) -> tuple[Rows, float]:
-    """Return the predicted intensity as one row, survivors before births, and the log of the weight that died.
+def predict_intensity(
+    prior: Mixture, scan: ScanInput, motion: Motion | None, sensor: Sensor
+) -> tuple[Rows, float, int]:
+    """Return the predicted intensity as one row, survivors before births.
 
+    Also return the log of the weight that died, and the number of components of survivors.
     The births carry the intensity of the multi-Bernoulli birth: the sum of existence times density over the sites.
     """
     num = len(prior.log_weights)
@@ -44,12 +47,12 @@ def predict_intensity(prior: Mixture, scan: ScanInput, motion: Motion | None, se
     offsets[1] = num
     one_track = Tracks(np.zeros((1, 2), np.int64), offsets, prior)
     rows = rows_of_scan(one_track, scan, motion, sensor)
-    log_died = rows.log_absent[0]
+    log_died, num_surviving = rows.log_absent[0], rows.offsets[1]
     all_components = np.zeros(2, np.int64)
     all_components[1] = len(rows.components.log_weights)
     never_absent = np.full(1, -math.inf)
     one_row = Rows(rows.labels[:1], all_components, never_absent, rows.components, rows.innovation)
-    return one_row, log_died
+    return one_row, log_died, num_surviving
 
 
 @kernel
@@ -85,7 +88,7 @@ def step_phd(
 
     Each measurement distributes one unit among targets and clutter.
     """
-    rows, _ = predict_intensity(prior, scan, motion, sensor)
+    rows, _, _ = predict_intensity(prior, scan, motion, sensor)
     options, log_clutter, num_raised = weighed_options(rows, scan, sensor, truncation)
     num_options = options.offsets[1]
     log_factors = np.zeros(num_options)

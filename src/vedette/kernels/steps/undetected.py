@@ -15,7 +15,8 @@ from vedette.kernels.base.compile import borrowing, inlined, kernel
 from vedette.kernels.base.types import Floats, Marks, Mixture, Motion, Sensor
 from vedette.kernels.gaussian.components import make_components, stacked_mixtures
 from vedette.kernels.gaussian.marks import copy_marks
-from vedette.kernels.gaussian.prediction import predicted_intensity
+from vedette.kernels.gaussian.modes import predicted_intensity
+from vedette.kernels.gaussian.prediction import survival_probabilities
 from vedette.kernels.gaussian.reduction import reduce_intensity
 
 # Standard deviations of a birth's position that represent "anywhere" about a measurement: wide relative to the noise.
@@ -91,17 +92,6 @@ def take_out_detected(sensor: Sensor, pose: Floats, states: Floats, node_weights
     """
     out = tables.copy()
     _take_out(sensor, pose, states, node_weights, out)
-    return out
-
-
-@kernel
-def survival_probabilities(motion: Motion, dt: float, states: Floats) -> Floats:
-    """Probability of survival over `dt` seconds at each of (num, state_dim) states, shape (num,)."""
-    out = np.empty(len(states))
-    for i in range(len(states)):
-        out[i] = motion.prob_survival(states[i], dt, motion.survival_params)
-        if not 0.0 <= out[i] <= 1.0:
-            raise ModelError("survival model: probability is not in [0, 1]")
     return out
 
 

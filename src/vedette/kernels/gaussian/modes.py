@@ -1,0 +1,122 @@
+"""Modes of motion: a hidden discrete state of each target, which changes as a Markov chain in continuous time.
+
+Prediction replaces a component of weight w and mode i by one for each mode j, of weight w P(j | i), that moves as in
+mode j. Components of one mode are then merged. If all of them are, this is the interacting multiple model of Blom and
+Bar-Shalom (1988).
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from vedette.kernels.base.compile import kernel
+from vedette.kernels.base.types import Floats, Mixture, Motion, Tracks
+from vedette.kernels.gaussian.components import components_between, components_like, copy_component, make_components
+from vedette.kernels.gaussian.linalg import log_or_minus_inf
+from vedette.kernels.gaussian.marks import marks_with_modes, mode_of, set_mode
+from vedette.kernels.gaussian.prediction import predict, survival_probabilities
+from vedette.kernels.gaussian.reduction import MixtureCaps, make_reduction_work, reduce_into
+from vedette.kernels.gaussian.scratch import make_scratch
+
+# The longest step, in mean stays in the mode that is left fastest: a target changes at most once in most steps. A
+# longer time is divided.
+_LONGEST = 0.25
+_LIGHTEST = 1e-6  # share of the weight of a track below which predicted components are dropped
+
+
+@kernel
+def mode_probabilities(rates: Floats, dt: float) -> Floats:
+    """Return exp(rates dt), the probability of each mode (column) `dt` seconds after each mode (row).
+
+    By uniformisation: the modes after a Poisson number of steps of a chain, with the rate of the fastest change, whose
+    steps may stay. All terms are positive.
+    """
+    num, fastest = len(rates), 0.0
+    for i in range(num):
+        fastest = max(fastest, -rates[i, i])
+    step, term = np.zeros((num, num)), np.zeros((num, num))
+    for i in range(num):
+        term[i, i] = math.exp(-fastest * dt)
+        for j in range(num):
+            step[i, j] = (1.0 if i == j else 0.0) + (rates[i, j] / fastest if fastest > 0.0 else 0.0)
+    total, changes = term.copy(), 0
+    while changes < fastest * dt or term.max() > 1e-17:
+        changes += 1
+        following = np.zeros((num, num))
+        for i in range(num):
+            for j in range(num):
+                for k in range(num):
+                    following[i, j] += term[i, k] * step[k, j] * fastest * dt / changes
+        term = following
+        total += term
+    return total
+
+
+@kernel
+def _after_step(tracks: Tracks, motion: Motion, dt: float) -> Tracks:
+    """Return the tracks after a step within which a target changes its mode at most once."""
+    given, num, num_modes = tracks.components, len(tracks.labels), len(motion.transition_params)
+    chain, dim, widest, room = motion.switching, given.means.shape[1], 0, num_modes * len(given.log_weights)
+    for i in range(num):
+        widest = max(widest, num_modes * (tracks.offsets[i + 1] - tracks.offsets[i]))
+    out = make_components(room, dim, marks_with_modes(given.marks, 0))
+    wide = components_like(out, widest)
+    floor = math.log(_LIGHTEST) if chain.merge_distance > 0.0 else -math.inf
+    caps = MixtureCaps(floor, chain.merge_distance, max(2, room))
+    probs, work, scratch = mode_probabilities(chain.rates, dt), make_reduction_work(widest, wide), make_scratch(dim, 1)
+    offsets, filled = np.zeros(num + 1, np.int64), 0
+    for i in range(num):
+        width = 0
+        for c in range(tracks.offsets[i], tracks.offsets[i + 1]):
+            before = mode_of(given.marks, c)
+            for mode in range(num_modes):
+                share = probs[before, mode] if before >= 0 else chain.at_birth[mode]
+                if share == 0.0:
+                    continue
+                copy_component(given, c, wide, width)
+                wide.log_weights[width] += math.log(share)
+                set_mode(wide.marks, width, mode)
+                predict(motion, mode, dt, given.means[c], given.covs[c], wide.means[width], wide.covs[width], scratch)
+                width += 1
+        filled = reduce_into(wide, width, caps, work, out, filled)
+        offsets[i + 1] = filled
+    return Tracks(tracks.labels, offsets, components_between(out, 0, filled))
+
+
+@kernel
+def branched_tracks(tracks: Tracks, motion: Motion, dt: float) -> tuple[Tracks, Floats]:
+    """Return the tracks `dt` seconds later, weighted by survival, and the log probability that each died, (num,)."""
+    given, num, fastest = tracks.components, len(tracks.labels), 0.0
+    survival, log_dead = survival_probabilities(motion, dt, given.means), np.empty(num)
+    log_weights = given.log_weights.copy()
+    for i in range(num):
+        dead = 0.0
+        for c in range(tracks.offsets[i], tracks.offsets[i + 1]):
+            dead += math.exp(log_weights[c]) * (1.0 - survival[c])
+            log_weights[c] += log_or_minus_inf(survival[c])
+        log_dead[i] = log_or_minus_inf(dead)
+    for i in range(len(motion.switching.rates)):
+        fastest = max(fastest, -motion.switching.rates[i, i])
+    num_steps = max(1, math.ceil(fastest * dt / _LONGEST))
+    moved = Tracks(tracks.labels, tracks.offsets, Mixture(log_weights, given.means, given.covs, given.marks))
+    for _ in range(num_steps):
+        moved = _after_step(moved, motion, dt / num_steps)
+    return moved, log_dead
+
+
+@kernel
+def predicted_intensity(intensity: Mixture, motion: Motion, dt: float) -> Mixture:
+    """Return the intensity after survival and motion over `dt` seconds."""
+    num, dim = intensity.means.shape
+    if len(motion.transition_params) > 1:
+        one_track = Tracks(np.zeros((1, 2), np.int64), np.array([0, num]), intensity)
+        return branched_tracks(one_track, motion, dt)[0].components
+    out, scratch = components_like(intensity, num), make_scratch(dim, 1)
+    survival = survival_probabilities(motion, dt, intensity.means)
+    for c in range(num):
+        copy_component(intensity, c, out, c)
+        out.log_weights[c] += log_or_minus_inf(survival[c])
+        predict(motion, 0, dt, intensity.means[c], intensity.covs[c], out.means[c], out.covs[c], scratch)
+    return out

@@ -1,0 +1,211 @@
+"""Modes of motion in every filter: against the enumeration of mode sequences and associations, and a textbook IMM."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy.linalg import expm
+
+import reference
+from filters.examples import DT, Scene, assert_same_glmb, assert_same_lmb, linear_scene, plain_glmb
+from reference import Floats, gaussian
+from reference import glmb as oracle
+from vedette import models
+from vedette.densities import LabelledDensity, as_glmb, as_lmb
+from vedette.filters import (
+    CbMemberFilter,
+    CphdFilter,
+    DeltaGlmbFilter,
+    FactoredGlmbFilter,
+    Limits,
+    LmbFilter,
+    MultiSensorGlmbFilter,
+    MultiSensorLmbFilter,
+    PhdFilter,
+)
+from vedette.kernels.gaussian.modes import mode_probabilities
+
+pytestmark = pytest.mark.lanes
+
+MOTIONS = models.constant_velocity(3.0), models.constant_turn(0.3, 1.0)
+SEEN = np.array([1.0, 0.4])
+AT_BIRTH = np.array([0.7, 0.3])
+# One step of `DT` is short in comparison, so that it is not divided.
+MODES = models.Modes(MOTIONS, (12.0, 7.0), at_birth=AT_BIRTH, detection_factors=SEEN, merge_distance=0.0)
+
+
+class WithModes(oracle.Model):
+    """The oracle's model of states with their mode as the last component, -1 at birth."""
+
+    def predictions(self, mean: Floats, cov: Floats) -> list[tuple[float, Floats, Floats]]:
+        before, changes = int(mean[-1]), expm(MODES.rates * DT)
+        shares = changes[before] if before >= 0 else AT_BIRTH
+        return [(share, *self._moved(mean, cov, mode)) for mode, share in enumerate(shares)]
+
+    def _moved(self, mean: Floats, cov: Floats, mode: int) -> tuple[Floats, Floats]:
+        motion, slope = MOTIONS[mode], np.empty((4, 4))
+        motion.transition_jacobian(mean[:4], DT, motion.transition_params, slope)  # type: ignore[misc]
+        moved = slope @ cov[:4, :4] @ slope.T + motion.noise_cov(mean[:4], DT)
+        return np.append(slope @ mean[:4], mode), np.pad(moved, ((0, 1), (0, 1)))
+
+
+def scene_with_modes() -> Scene:
+    """The linear scene, whose targets turn at times and are then seen less."""
+    scene = linear_scene()
+    rows = np.eye(2, 5)
+    plain = WithModes(**{name: getattr(scene.plain, name) for name in scene.plain.__match_args__})
+    given: dict[str, Any] = {
+        "measurement_jacobian": lambda x: rows,
+        "prob_detection": lambda x: 0.85 * (SEEN[int(x[-1])] if x[-1] >= 0.0 else 1.0),
+    }
+    return replace(scene, motion=MODES, plain=replace(plain, **given))
+
+
+def births_of(scene: Scene, step: int) -> reference.Lmb:
+    """The births of a step, of no mode yet."""
+    return {
+        label: (existence, [(w, np.append(m, -1.0), np.pad(c, ((0, 1), (0, 1)))) for w, m, c in mixture])
+        for label, (existence, mixture) in scene.plain_births(step).items()
+    }
+
+
+def without_modes(mixture: reference.Mixture) -> reference.Mixture:
+    return [(w, m[:4], c[:4, :4]) for w, m, c in mixture]
+
+
+def ordered(hypotheses: reference.Glmb) -> reference.Glmb:
+    """The hypotheses with the components of each track in one order, without their modes."""
+    return [
+        (weight, {label: sorted(without_modes(own), key=lambda each: tuple(each[1])) for label, own in tracks.items()})
+        for weight, tracks in hypotheses
+    ]
+
+
+def mode_weights(belief: LabelledDensity) -> Floats:
+    """Expected number of targets in each mode, and of those without one yet."""
+    tracks = as_lmb(belief, max_components=10**6, merge_distance=0.0, log_min_weight=-math.inf)
+    modes = tracks.tracks.marks.modes
+    existence = np.repeat(tracks.existence, np.diff(tracks.tracks.offsets)) * np.exp(tracks.tracks.log_weights)
+    return np.array([existence[modes[:, 0] == mode].sum() for mode in (-1, 0, 1)])
+
+
+def enumerated_weights(hypotheses: reference.Glmb) -> Floats:
+    """The same, of the oracle."""
+    every = [(w * own, m[-1]) for w, tracks in hypotheses for mix in tracks.values() for own, m, _ in mix]
+    return np.array([sum(weight for weight, mode in every if mode == each) for each in (-1, 0, 1)])
+
+
+@pytest.mark.parametrize("kind", [DeltaGlmbFilter, FactoredGlmbFilter, MultiSensorGlmbFilter])
+def test_hypotheses_equal_the_enumeration(kind):
+    scene, hypotheses = scene_with_modes(), oracle.no_target()
+    central = kind is MultiSensorGlmbFilter
+    tracker = kind(scene.targets, [scene.sensor] if central else scene.sensor, Limits.none())
+    belief, rng = tracker.initial(), np.random.default_rng(0)
+    for step, scan in enumerate(scene.scans, 1):
+        hypotheses, _ = oracle.step(hypotheses, births_of(scene, step), list(scan), scene.plain)
+        given = ([scan], [scene.pose]) if central else (scan, scene.pose)
+        belief, _ = tracker.step(belief, *given, DT, step, rng=rng)
+        belief.validate()
+        wanted = oracle.as_glmb(hypotheses)
+        assert_same_glmb(ordered(plain_glmb(as_glmb(belief, max_hypotheses=10**6)[0])), ordered(wanted))
+        np.testing.assert_allclose(mode_weights(belief), enumerated_weights(wanted), rtol=0, atol=1e-10)
+
+
+@pytest.mark.parametrize("kind", [LmbFilter, MultiSensorLmbFilter])
+def test_an_lmb_equals_the_enumeration(kind):
+    scene, lmb = scene_with_modes(), dict[Any, Any]()
+    central = kind is MultiSensorLmbFilter
+    tracker = kind(scene.targets, [scene.sensor] if central else scene.sensor, Limits.none())
+    belief, rng = tracker.initial(), np.random.default_rng(0)
+    for step, scan in enumerate(scene.scans, 1):
+        lmb, _ = oracle.lmb_step(lmb, births_of(scene, step), list(scan), scene.plain)
+        given = ([scan], [scene.pose]) if central else (scan, scene.pose)
+        belief, _ = tracker.step(belief, *given, DT, step, rng=rng)
+        belief.validate()
+        assert_same_lmb(belief, {label: (r, without_modes(own)) for label, (r, own) in lmb.items()})
+        wanted = [(1.0, {label: [(r * w, m, c) for w, m, c in own]}) for label, (r, own) in lmb.items()]
+        np.testing.assert_allclose(mode_weights(belief), enumerated_weights(wanted), rtol=0, atol=1e-10)
+
+
+def test_probabilities_of_modes_are_the_exponential():
+    rng = np.random.default_rng(1)
+    for num in (1, 2, 3, 5):
+        rates = rng.exponential(1.0, (num, num)) * (1.0 - np.eye(num))
+        rates -= np.diag(rates.sum(axis=1))
+        for dt in (1e-9, 0.01, 1.0, 30.0):
+            np.testing.assert_allclose(mode_probabilities(rates, dt), expm(rates * dt), rtol=0, atol=1e-13)
+
+
+def interacting_multiple_model(modes: models.Modes, scans: Floats, times: Floats, birth: Any, noise: Floats) -> Any:
+    """Mean and covariance after each scan of position (Blom and Bar-Shalom 1988)."""
+    rows, found = np.eye(2, 4), []
+    means, covs, probs = [birth[0]], [birth[1]], np.ones(1)
+    for step, (scan, dt) in enumerate(zip(scans, times, strict=True)):
+        if step > 0:
+            changes = modes.at_birth[np.newaxis] if len(means) == 1 else expm(modes.rates * dt)
+            predicted = probs @ changes
+            before, moved = list(zip(means, covs, strict=True)), []
+            for mode, motion in enumerate(modes.motions):
+                shares, slope = probs * changes[:, mode] / predicted[mode], np.empty((4, 4))
+                mean, cov = _moments(shares, before)
+                motion.transition_jacobian(mean, dt, motion.transition_params, slope)  # type: ignore[misc]
+                moved.append((slope @ mean, slope @ cov @ slope.T + motion.noise_cov(mean, dt)))
+            means, covs, probs = [mean for mean, _ in moved], [cov for _, cov in moved], predicted
+        updated = [
+            gaussian.ekf_update(mean, cov, scan, lambda x: x[:2], lambda _: rows, noise, (False, False))
+            for mean, cov in zip(means, covs, strict=True)
+        ]
+        means, covs = [mean for mean, _, _ in updated], [cov for _, cov, _ in updated]
+        probs = probs * [likelihood for _, _, likelihood in updated]
+        probs /= probs.sum()
+        found.append((*_moments(probs, list(zip(means, covs, strict=True))), probs))
+    return found
+
+
+def _moments(shares: Floats, gaussians: list[tuple[Floats, Floats]]) -> tuple[Floats, Floats]:
+    mean = sum(share * each for share, (each, _) in zip(shares, gaussians, strict=True))
+    spread = (cov + np.outer(each - mean, each - mean) for each, cov in gaussians)
+    return np.asarray(mean), np.asarray(sum(share * cov for share, cov in zip(shares, spread, strict=True)))
+
+
+@pytest.mark.parametrize(
+    "kind",
+    [DeltaGlmbFilter, LmbFilter, FactoredGlmbFilter, PhdFilter, CphdFilter, CbMemberFilter],
+    ids=lambda k: k.__name__,
+)
+def test_one_target_is_an_interacting_multiple_model(kind):
+    motions = models.constant_velocity(0.5), models.constant_turn(0.2, 1.0), models.constant_turn(-0.2, 1.0)
+    modes = models.Modes(motions, (20.0, 8.0, 9.0), merge_distance=math.inf)
+    region, rng = models.Region(-2000.0, 2000.0, -2000.0, 2000.0), np.random.default_rng(3)
+    mean, cov = np.array([0.0, 0.0, 10.0, 0.0]), np.diag([25.0, 25.0, 9.0, 9.0])
+    birth = models.BirthModel(np.array([0.9999]), mean[None], cov[None], steps=frozenset({1}))
+    sensor = models.SensorModel(
+        models.position(),
+        models.constant_noise([3.0, 3.0]),
+        models.constant_detection(1.0 - 1e-12),
+        models.region_clutter(1e-12, region, "position"),
+    )
+    tracker = kind(
+        models.TargetModel(modes, models.constant_survival(1.0), birth), sensor, Limits(max_existence=1.0 - 1e-12)
+    )
+    times, state, scans = rng.uniform(0.3, 1.8, 30), mean, []
+    for step, dt in enumerate(times):
+        state = motions[step // 10].propagate(state, dt)[0]
+        scans.append(state[:2] + 3.0 * rng.standard_normal(2))
+    wanted = interacting_multiple_model(modes, np.array(scans), times, (mean, cov), 9.0 * np.eye(2))
+    belief = tracker.initial()
+    for step, (scan, dt) in enumerate(zip(scans, times, strict=True)):
+        belief, _ = tracker.step(belief, scan[None], np.zeros(3), float(dt), step + 1, rng=rng)
+        own = belief.tracks if isinstance(belief, LabelledDensity) else belief
+        weights = np.exp(own.log_weights) / np.exp(own.log_weights).sum()
+        found = _moments(weights, list(zip(own.means, own.covs, strict=True)))
+        np.testing.assert_allclose(found[0], wanted[step][0], rtol=0, atol=1e-6)
+        np.testing.assert_allclose(found[1], wanted[step][1], rtol=0, atol=1e-6)
+        if step > 0:
+            assert sorted(own.marks.modes[:, 0]) == [0, 1, 2]
+            order = np.argsort(own.marks.modes[:, 0])
+            np.testing.assert_allclose(weights[order], wanted[step][2], rtol=0, atol=1e-8)
