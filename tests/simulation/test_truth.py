@@ -11,7 +11,7 @@ from reference.user_models import nothing_like_a_state
 from vedette import models
 from vedette.errors import InputError, ModelError
 from vedette.simulation import ScriptedTargets, Truth
-from vedette.simulation.truth import semidefinite_factor
+from vedette.simulation.true_motion import semidefinite_factor
 
 TIMES = np.arange(1.0, 41.0)
 STARTS = np.array([[-55.0, 875.0, 15.0, -6.0], [-180.0, -205.0, -5.5, -19.0], [340.0, -5.0, 10.0, 6.0]])

@@ -8,10 +8,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from vedette.kernels.base.types import Floats
-from vedette.models import MotionModel, Region
+from vedette.models import Modes, MotionModel, Region
 from vedette.models.arguments import float_array, generator
 from vedette.models.fields import NonNegative, Probability, check_fields
-from vedette.simulation.truth import Truth, moved_states, scan_times, semidefinite_factor
+from vedette.simulation.true_motion import first_mode, moved_states, moved_target, semidefinite_factor
+from vedette.simulation.truth import Truth, scan_times
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -70,12 +71,17 @@ class PoissonTargets:
     def _life(self, state: Floats, times: Floats, rng: np.random.Generator) -> Floats:
         """(num_scans of its life, state_dim) states of a target from its first scan."""
         states: list[Floats] = []
+        mode = first_mode(self.motion, rng) if isinstance(self.motion, Modes) else 0
         for scan in range(len(times)):
             if scan > 0:
                 if rng.random() < self.death_probability:
                     break
-                dt, normals = float(times[scan] - times[scan - 1]), rng.standard_normal((1, len(state)))
-                state = moved_states(self.motion, state[np.newaxis], dt, normals, np.ones(1, np.bool_))[0]
+                dt = float(times[scan] - times[scan - 1])
+                if isinstance(self.motion, Modes):
+                    state, mode = moved_target(self.motion, state, mode, dt, rng)
+                else:
+                    normals = rng.standard_normal((1, len(state)))
+                    state = moved_states(self.motion, state[np.newaxis], dt, normals, np.ones(1, np.bool_))[0]
             if self.region is not None and not self.region.contains(state[np.newaxis, :2])[0]:
                 break
             states.append(state)

@@ -14,7 +14,7 @@ from typing import Any, TypeAlias
 
 import numpy as np
 
-from vedette.densities.estimates import Estimate
+from vedette.densities.estimates import Estimate, joined_mode_probs
 from vedette.errors import InputError
 from vedette.kernels.base.types import Floats, Ints
 from vedette.simulation.arrow import Columns, Kind, Layout
@@ -39,7 +39,7 @@ LAYOUTS: dict[str, Layout] = {
     "scans": Layout({**_TIME, **_COUNTS, **dict.fromkeys(OSPA_COLUMNS, Kind.NUMBER), **FUSION_COLUMNS}),
     "truth": Layout({**_TIME, "target": Kind.INTEGER}, {"state_": Kind.NUMBER}),
     "tracks": Layout(
-        {**_TIME, **_LABEL, "existence": Kind.NUMBER}, dict.fromkeys(("mean_", "cov_", "class_"), Kind.NUMBER)
+        {**_TIME, **_LABEL, "existence": Kind.NUMBER}, dict.fromkeys(("mean_", "cov_", "class_", "mode_"), Kind.NUMBER)
     ),
     "sensors": Layout(
         {**_TIME, "sensor": Kind.INTEGER, **dict.fromkeys(POSE_COLUMNS, Kind.NUMBER), **SENSOR_COLUMNS},
@@ -185,6 +185,7 @@ def _tracks(record: RunRecord) -> Columns:
         **_columns("mean_", np.concatenate([estimate.means for estimate in record.estimates])),
         **_columns("cov_", covs.reshape(len(covs), covs.shape[1] * covs.shape[2])),
         **_columns("class_", np.concatenate([estimate.class_probs for estimate in record.estimates])),
+        **_columns("mode_", joined_mode_probs(record.estimates)),
     }
 
 
@@ -192,11 +193,10 @@ def _estimates_of(table: Mapping[str, Any], num_scans: int) -> tuple[Estimate, .
     labels = np.stack([table["birth_step"], table["birth_site"]], axis=1)
     means, existence = _matrix(table, "mean_"), table["existence"]
     covs = _matrix(table, "cov_").reshape(len(means), means.shape[1], means.shape[1])
-    classes = np.empty((len(means), 0))
-    if "class_0" in table:  # of targets with classes
-        classes = _matrix(table, "class_")
+    none = np.empty((len(means), 0))
+    classes, modes = (_matrix(table, name) if f"{name}0" in table else none for name in ("class_", "mode_"))
     rows = [slice(start, stop) for start, stop in pairwise(_offsets(table, num_scans).tolist())]
-    return tuple(Estimate(labels[row], means[row], covs[row], existence[row], classes[row]) for row in rows)
+    return tuple(Estimate(labels[row], means[row], covs[row], existence[row], classes[row], modes[row]) for row in rows)
 
 
 def _sensors(record: RunRecord) -> Columns:

@@ -9,16 +9,14 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import ArrayLike
 
-from vedette.errors import InputError, ModelError
 from vedette.internal.representation import SummaryRepr
 from vedette.kernels.base.types import Bools, Floats, Ints
-from vedette.models import MotionModel
+from vedette.models import Modes, MotionModel
 from vedette.models.arguments import float_array, generator, reject
+from vedette.simulation.true_motion import manoeuvring_target, moved_states
 
 # s. Start times and scan times come from different sums; they count as equal within this tolerance.
 TIME_TOLERANCE = 1e-9
-# A pivot below this share of its variance is rounding: that direction has no noise of its own.
-_PIVOT_TOLERANCE = 1e-12
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
@@ -112,7 +110,7 @@ class ScriptedTargets:
     """Targets that start from given states and follow a motion model.
 
     Attributes:
-        motion: motion model.
+        motion: motion model. Of one with modes, targets without process noise keep the first mode.
         initial_states: (num_targets, state_dim) state of each at its start time.
         start_times: (num_targets,) s. None: the first scan.
         end_times: (num_targets,) last time of each, included, s. Infinite or None: to the end.
@@ -173,6 +171,10 @@ class ScriptedTargets:
         if self.initial_stds is not None:
             first = first + self.initial_stds * rng.standard_normal(first.shape)
         elapsed = _elapsed(scans, np.asarray(starts), alive)
+        if isinstance(self.motion, Modes):
+            for i, own in enumerate(rng.spawn(num)):
+                states[i] = manoeuvring_target(self.motion, first[i], elapsed[i], own if noisy[i] else None)
+            return Truth.from_arrays(scans, alive, states)
         normals = np.zeros_like(states)
         # Ordered by target and then by time, so that the noise of a target does not depend on the lives of the others.
         moves = (elapsed > 0.0) & noisy[:, None]
@@ -197,40 +199,3 @@ def _elapsed(scans: Floats, starts: Floats, alive: Bools) -> Floats:
         elapsed[due, scan] = time - since[due]
         since[due] = time
     return elapsed
-
-
-def moved_states(motion: MotionModel, states: Floats, dt: float, normals: Floats, noisy: Bools) -> Floats:
-    """(num, state_dim) states `dt` seconds later, with process noise where `noisy`. Raises `ModelError`.
-
-    normals: (num, state_dim) standard normal deviates, read where `noisy`.
-    """
-    moved, disturbed = motion.propagate(states, dt), noisy.nonzero()[0]
-    if len(disturbed):
-        factors: dict[bytes, Floats] = {}
-        for i, cov in zip(disturbed.tolist(), motion.noise_covs(states[disturbed], dt), strict=True):
-            key = cov.tobytes()  # most motion models: equal for all states
-            if key not in factors:
-                factors[key] = semidefinite_factor(cov)
-            moved[i] += factors[key] @ normals[i]
-    check_moved(states, moved, dt)
-    return moved
-
-
-def check_moved(states: Floats, moved: Floats, dt: float) -> None:
-    """Raise `ModelError` unless all propagated states (num, state_dim) are finite."""
-    if not np.isfinite(moved).all():
-        bad = np.isfinite(moved).all(axis=1).argmin()
-        state, got = states[bad], moved[bad]
-        raise ModelError(f"motion of a target at state {state}, dt {dt}: expected a finite state; got {got}")
-
-
-def semidefinite_factor(cov: Floats) -> Floats:
-    """Return lower L with L L' = cov for a positive semidefinite covariance, which may be singular."""
-    factor = np.zeros_like(cov)
-    for j in range(len(cov)):
-        column = cov[j:, j] - factor[j:, :j] @ factor[j, :j]
-        if column[0] < -_PIVOT_TOLERANCE * max(1.0, cov[j, j]) or not np.isfinite(column).all():
-            raise InputError(f"covariance: expected positive semidefinite; got {cov.tolist()}")
-        if column[0] > _PIVOT_TOLERANCE * cov[j, j]:
-            factor[j:, j] = column / np.sqrt(column[0])
-    return factor

@@ -8,10 +8,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from vedette.kernels.base.types import Bools, Floats, Ints
-from vedette.models import MotionModel, Region
+from vedette.models import Modes, MotionModel, Region
 from vedette.models.arguments import float_array, generator, reject
 from vedette.models.fields import Count, Probability, check_fields
-from vedette.simulation.truth import Truth, check_moved, scan_times, semidefinite_factor
+from vedette.simulation.true_motion import check_moved, first_mode, moved_target, semidefinite_factor
+from vedette.simulation.truth import Truth, scan_times
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -70,15 +71,22 @@ class UniformTargets:
             all_ids.append(ids)
             all_states.append(states)
         offsets: Ints = np.concatenate([[0], np.cumsum([len(ids) for ids in all_ids])]).astype(np.int64)
-        return Truth(scans, offsets, np.concatenate(all_ids), np.concatenate(all_states))
+        return Truth(scans, offsets, np.concatenate(all_ids), np.concatenate(all_states)[:, : self.motion.state_dim])
 
     def _born(self, num: int, rng: np.random.Generator) -> Floats:
-        """(num, state_dim) initial states."""
-        return np.hstack([self.region.sample(num, rng=rng), self.std * rng.standard_normal((num, len(self.std)))])
+        """(num, state_dim) initial states, behind them the mode of a motion with modes."""
+        states = np.hstack([self.region.sample(num, rng=rng), self.std * rng.standard_normal((num, len(self.std)))])
+        if not isinstance(self.motion, Modes):
+            return states
+        return np.column_stack([states, [first_mode(self.motion, rng) for _ in range(num)]])
 
     def _moved(self, states: Floats, dt: float, rng: np.random.Generator) -> tuple[Floats, Bools]:
-        """(num, state_dim) states `dt` seconds later, wrapped at edges, and (num,) whether a target crossed none."""
-        moved = self.motion.propagate(states, dt) + self._noise(states, dt, rng)
+        """States (and modes) `dt` seconds later, wrapped at edges, and (num,) whether a target crossed none."""
+        if isinstance(self.motion, Modes):
+            each = [moved_target(self.motion, own[:-1], int(own[-1]), dt, rng) for own in states]
+            moved = np.array([[*state, mode] for state, mode in each]).reshape(states.shape)
+        else:
+            moved = self.motion.propagate(states, dt) + self._noise(states, dt, rng)
         check_moved(states, moved, dt)
         stays = self.region.contains(moved[:, :2])
         low, high = self.region.bounds[::2], self.region.bounds[1::2]
