@@ -169,7 +169,8 @@ def test_the_replay_has_the_heights_of_the_motion(tmp_path: Path) -> None:
 
 # Which subscripts of these names are places of a velocity, a height, or components of a pose behind the position.
 NAMES = {"state", "states", "mean", "means", "std", "stds", "cov", "covs", "moments", "pose", "poses", "pose_vector"}
-OWN_STATES = {"models/kinematics.py", "stonesoup/motions.py"}  # motions, which define the states that they move
+# Motions, which define the states that they move.
+OWN_STATES = {"models/kinematics.py", "models/manoeuvres.py", "stonesoup/motions.py"}
 
 
 def bare_places(source: str) -> list[int]:

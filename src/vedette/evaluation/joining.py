@@ -133,5 +133,5 @@ def _relabel(estimate: Estimate, names: dict[Label, Label]) -> Estimate:
     labels = [names.get((step, index), (step, index)) for step, index in estimate.labels.tolist()]
     order = sorted(range(len(labels)), key=labels.__getitem__)
     relabelled = np.array(labels, np.int64).reshape(-1, 2)[order]
-    columns = estimate.means, estimate.covs, estimate.existence, estimate.class_probs
+    columns = estimate.means, estimate.covs, estimate.existence, estimate.class_probs, estimate.mode_probs
     return Estimate(relabelled, *(column[order] for column in columns))

@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from vedette.densities.estimates import joined_mode_probs
 from vedette.densities.inspection import state_columns
 from vedette.errors import InputError
 from vedette.evaluation.joining import Join, track_names
@@ -78,6 +79,10 @@ def table_of_run(record: RunRecord, scenario: Scenario, joins: Sequence[Join] = 
         probs = np.concatenate([estimate.class_probs for estimate in record.estimates])
         table["class"] = [classes[k] for k in probs.argmax(axis=1).tolist()]
         table |= {f"prob_{name}": probs[:, k].tolist() for k, name in enumerate(classes)}
+    if modes := model.mode_names:
+        probs = joined_mode_probs(record.estimates, len(modes))
+        table["mode"] = [modes[k] for k in probs.argmax(axis=1).tolist()]
+        table |= {f"prob_{name}": probs[:, k].tolist() for k, name in enumerate(modes)}
     table["target"] = [_name(matched_targets.get((row[0], row[1])), names) for row in rows]
     return table
 

@@ -11,7 +11,7 @@ import numpy as np
 
 from vedette.evaluation.innovations import Assumed, Compared
 from vedette.internal.text import pluralise
-from vedette.kernels.base.types import VELOCITY, Bools, Floats
+from vedette.kernels.base.types import VELOCITY, VY, Bools, Floats
 from vedette.models.sensor import SensorModel
 
 _GATE = 4.0  # standard deviations of the third measurement as predicted from two
@@ -49,7 +49,7 @@ def unexplained_course_warnings(instants: Sequence[Compared], assumed: Assumed) 
     courses faster than births from measurements assume count.
     """
     model, warnings = assumed.scenario.model, list[str]()
-    if (births := model.birth.from_measurements) is None:
+    if (births := model.birth.from_measurements) is None or len(births.std) <= VY:  # without velocities
         return ()
     speed, area = max(births.std[VELOCITY]), model.region.build().area
     for s, (name, sensor) in enumerate(zip(model.sensor_names, assumed.sensors, strict=True)):

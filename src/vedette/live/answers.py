@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Sequence
+from itertools import zip_longest
 from typing import Any, TypeAlias
 
 import numpy as np
@@ -21,7 +22,12 @@ _NAMES = {"px": "x", "py": "y", "vx": "vx", "vy": "vy", HEIGHT: "z", CLIMB: "vz"
 
 
 def track_answers(
-    estimate: Estimate, classes: Sequence[str], origin: Origin | None, compass: Compass | None, state: Sequence[str]
+    estimate: Estimate,
+    classes: Sequence[str],
+    modes: Sequence[str],
+    origin: Origin | None,
+    compass: Compass | None,
+    state: Sequence[str],
 ) -> list[Answer]:
     """Return an entry for each estimated target, with place in degrees and course if known. state: of the motion."""
     places = {_NAMES[name]: place for place, name in enumerate(state) if name in _NAMES}
@@ -34,6 +40,8 @@ def track_answers(
         tracks.append({"label": ".".join(map(str, label)), **components, "std": std, "existence": existence})
     for track, probs in zip(tracks, estimate.class_probs.tolist() if classes else (), strict=False):
         track["classes"] = dict(zip(classes, probs, strict=True))
+    for track, probs in zip(tracks, estimate.mode_probs.tolist() if modes else (), strict=False):
+        track["modes"] = dict(zip_longest(modes, probs, fillvalue=0.0))
     if origin is not None and tracks:
         for track, (lon, lat) in zip(tracks, origin.to_degrees(estimate.means[:, :2]).tolist(), strict=True):
             track.update(lon=lon, lat=lat)

@@ -75,6 +75,7 @@ def build_live_loop(
         max_lead=max_lead,
         seed=seed,
         classes=tuple(model.classes),
+        modes=model.mode_names,
         valid_area=box_of(model.region.build().corners),
         extents=tuple(returns.extent or 0.0 for returns in returns_models(model)),
         assumed=Assumed.of(live_scenario.scenario),

@@ -86,6 +86,7 @@ class LiveLoop:
             clock would otherwise end the window of all other sensors.
         seed: seed of the decisions.
         classes: names of the classes of targets, or () if they have none.
+        modes: names of the modes of motion, or () if there is one.
         valid_area: (2, 2) lower left and upper right corner of the area of valid measurements, in m. Others are left
             out and counted in the answer as `beyond`. None: no limit.
         extents: for each sensor, the largest distance in m between neighbouring returns of a target. 0: returns are
@@ -105,6 +106,7 @@ class LiveLoop:
     max_lead: float = 60.0
     seed: int = 0
     classes: tuple[str, ...] = ()
+    modes: tuple[str, ...] = ()
     valid_area: Floats | None = None
     extents: tuple[float, ...] = ()
     assumed: Assumed | None = None
@@ -222,7 +224,7 @@ class LiveLoop:
         assert belief.time is not None  # a scan was taken, or one before it
         estimate = self.estimate(belief.fused, belief.step)
         state_components = self.tracker.tracker.targets.motion.components
-        tracks = track_answers(estimate, self.classes, self.origin, self.compass, state_components)
+        tracks = track_answers(estimate, self.classes, self.modes, self.origin, self.compass, state_components)
         counts = {"late": timeline.num_late, "dropped": timeline.num_dropped, "repeated": timeline.num_repeated}
         return {"line": state.num_lines, **self._line_time(state, belief.time), "tracks": tracks, **counts}
 

@@ -65,7 +65,7 @@ def replay_data(strategy: Strategy, record: RunRecord, group: str, *, trust: boo
         "truth": [_targets(record, scan, decimals, len(components) > VY) for scan in range(record.num_scans)],
         "estimates": _estimates(record, scenario, decimals),
         **({"heights": _heights(record, components)} if HEIGHT in components else {}),
-        **({"classes": _classes(record, scenario)} if scenario.model.classes else {}),
+        **({"classes": _likeliest(record, scenario)} if scenario.model.classes or scenario.model.mode_names else {}),
         "poses": [
             [pose_data(pose, section, decimals) for pose, section in zip(poses, sections, strict=True)]
             for poses in record.poses
@@ -188,12 +188,13 @@ def _heights(record: RunRecord, components: Sequence[str]) -> dict[str, Any]:
     return heights
 
 
-def _classes(record: RunRecord, scenario: Scenario) -> list[list[list[Any]]]:
-    """Return for each estimate of each scan its most probable class with the probability."""
-    names = list(scenario.model.classes)
+def _likeliest(record: RunRecord, scenario: Scenario) -> list[list[list[Any]]]:
+    """Return for each estimate of each scan its most probable class, or else mode of motion, with the probability."""
+    names = tuple(scenario.model.classes) or scenario.model.mode_names
+    field = "class_probs" if scenario.model.classes else "mode_probs"
     return [
-        [[names[probs.argmax()], round(float(probs.max()), 3)] for probs in estimate.class_probs]
-        for estimate in record.estimates
+        [[names[probs.argmax()], round(float(probs.max()), 3)] if probs.any() else ["new", 1.0] for probs in each]
+        for each in (getattr(estimate, field) for estimate in record.estimates)
     ]
 
 

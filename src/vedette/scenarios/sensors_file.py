@@ -11,7 +11,7 @@ from vedette.errors import InputError, ScenarioError
 from vedette.internal.quantities import COMPONENTS, HEIGHT_DEPENDENT
 from vedette.internal.reading import read_text
 from vedette.internal.text import pluralise
-from vedette.kernels.base.types import CLIMB, HEIGHT, PLANE, STATE_COMPONENTS, VELOCITY
+from vedette.kernels.base.types import CLIMB, HEIGHT, PLANE, STATE_COMPONENTS, VELOCITY, common_components
 from vedette.scenarios.diagnostics import Diagnostic, Fault, describe
 from vedette.scenarios.loading import diagnose, locate_fault
 from vedette.scenarios.sections import ScenarioModel
@@ -104,10 +104,19 @@ def placeholder_sections(given: Mapping[str, Any], speed: float) -> dict[str, An
     has_height = measures_heights(given)
     section = given.get("motion")
     motion: Mapping[str, Any] = section if isinstance(section, Mapping) else {}
-    kind = motion.get("kind", "constant_velocity_height" if has_height else "constant_velocity")
-    names = motion.get("components", STATE_COMPONENTS.get(kind) if isinstance(kind, str) else None)
-    birth = measured_birth(100.0, speed, names if isinstance(names, Sequence) else PLANE)
+    names = _state_components(motion, "constant_velocity_height" if has_height else "constant_velocity")
+    birth = measured_birth(100.0, speed, names)
     return {**_PLACEHOLDERS, "birth": birth, **({"motion": {"kind": "constant_velocity_height"}} if has_height else {})}
+
+
+def _state_components(motion: Mapping[str, Any], default: str) -> Sequence[str]:
+    """Return the names of the components of states, as far as a section of the motion says. default: its kind."""
+    modes, kind = motion.get("modes"), motion.get("kind", default)
+    if isinstance(modes, Mapping):
+        each = [mode.get("motion", {}) for mode in modes.values() if isinstance(mode, Mapping)]
+        return common_components([_state_components(own, default) for own in each if isinstance(own, Mapping)])
+    names = motion.get("components", STATE_COMPONENTS.get(kind) if isinstance(kind, str) else None)
+    return names if isinstance(names, Sequence) else PLANE
 
 
 def measures_heights(given: Mapping[str, Any]) -> bool:

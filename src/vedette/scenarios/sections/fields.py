@@ -186,6 +186,11 @@ class ScenarioFields(Section):
         return tuple(sensor.name or f"sensor {number}" for number, sensor in enumerate(self.sensors, 1))
 
     @property
+    def mode_names(self) -> tuple[str, ...]:
+        """Names of the modes of motion, or () if targets have one motion."""
+        return tuple(getattr(self.motion, "modes", ()))
+
+    @property
     def by_compass(self) -> bool:
         """True if directions are given and returned as courses, clockwise from true north, as on a chart."""
         recorded = self.recording is not None and self.recording.bearings == "north"

@@ -117,6 +117,15 @@ class ScenarioModel(ScenarioFields):
             yield ("fusion", "limits", "max_components"), wanted, describe(limits.max_components)
 
     @check
+    def _modes(self) -> Iterator[Finding]:
+        if self.mode_names and self.fusion.kind == "parallel" and len(self.sensors) > 1:
+            wanted = "sequential, central or another fusion that keeps the modes of motion"
+            yield ("fusion", "kind"), wanted, describe(self.fusion.kind)
+        if self.mode_names and self.filter.kind != "custom" and self.filter.limits.max_components < 2:
+            wanted = "at least 2 for a motion with modes"
+            yield ("filter", "limits", "max_components"), wanted, describe(self.filter.limits.max_components)
+
+    @check
     def _heights(self) -> Iterator[Finding]:
         """Yield faults if measurements depend on a height but states of the filters or the true targets have none."""
         others = ", ".join(each for each in COMPONENTS if each not in HEIGHT_DEPENDENT)
