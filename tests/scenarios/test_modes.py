@@ -10,12 +10,15 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.linalg import expm
 from typer.testing import CliRunner
 
 from scenarios.minimal import changed
 from vedette import models
 from vedette.cli import app
+from vedette.densities import Estimate
 from vedette.evaluation import run_scenario
+from vedette.evaluation.innovations import Instant, _predicted
 from vedette.live.answers import track_answers
 from vedette.reports.replay import _likeliest
 from vedette.scenarios import load_scenario
@@ -126,3 +129,30 @@ def test_a_run_keeps_the_probabilities(tmp_path):
     table = next((tmp_path / "tables").rglob("tracks*.csv"))
     with table.open(encoding="utf-8") as file:
         assert any(name.startswith("mode_") for name in next(csv.reader(file)))
+
+
+def test_show_names_the_modes(tmp_path):
+    found = CliRunner().invoke(app, ["show", str(written(tmp_path, text()))])
+    assert found.exit_code == 0, found.output
+    assert "modes cruise (40 s), turn (8 s), hidden (for ever)" in " ".join(found.output.split())
+
+
+def test_the_fit_predicts_by_modes():
+    motions = models.constant_velocity(0.1), models.constant_turn(0.4, 1.0)
+    modes = models.Modes(motions, (20.0, 5.0), at_birth=(0.2, 0.8), detection_factors=(1.0, 0.5))
+    mean, cov, dt, labels = np.array([1.0, 2.0, 3.0, -1.0]), np.diag([4.0, 4.0, 1.0, 1.0]), 2.0, np.array([[1, 0]])
+    estimate = Estimate(labels, mean[None], cov[None], np.ones(1), mode_probs=np.array([[0.6]]))  # .4 are new
+    before, now = (Instant(time, np.zeros((1, 3)), (None,), estimate) for time in (0.0, dt))
+    shares = np.array([0.6 + 0.4 * 0.2, 0.4 * 0.8]) @ expm(modes.rates * dt)
+    ends, spreads = [], []
+    for motion in motions:
+        slope = np.empty((4, 4))
+        motion.transition_jacobian(mean, dt, motion.transition_params, slope)
+        ends.append(slope @ mean)
+        spreads.append(slope @ cov @ slope.T + motion.noise_cov(mean, dt))
+    wanted = shares @ np.array(ends)
+    apart = [np.outer(end - wanted, end - wanted) for end in ends]
+    _, found, covs, seen = _predicted(before, now, modes)
+    np.testing.assert_allclose(found[0], wanted, rtol=1e-9)
+    np.testing.assert_allclose(covs[0], np.einsum("m,mij->ij", shares, np.add(spreads, apart)), rtol=1e-6, atol=1e-6)
+    np.testing.assert_allclose(seen, shares @ [1.0, 0.5])

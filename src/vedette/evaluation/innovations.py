@@ -11,7 +11,9 @@ from scipy.sparse.csgraph import connected_components
 
 from vedette.densities import Estimate
 from vedette.kernels.base.types import Bools, Floats, Ints
+from vedette.kernels.gaussian.modes import mode_probabilities
 from vedette.models.measurement import wrap_periodic
+from vedette.models.modes import Modes
 from vedette.models.motion import MotionModel
 from vedette.models.scan_rows import ScanLike, noise_of_rows, values_of
 from vedette.models.sensor import SensorModel
@@ -133,28 +135,46 @@ def compared(before: Instant, now: Instant, assumed: Assumed) -> Compared:
     A track is predicted from its estimate at the instant before, with the motion model. Its measurement and Jacobian
     are linearised there (Kalman innovations). Scans of one time are compared with one prediction.
     """
-    labels, means, covs = _predicted(before, now, assumed.motion)
+    labels, means, covs, seen = _predicted(before, now, assumed.motion)
     detected, fits = np.full((len(labels), len(now.rows)), -1), list[SensorFit | None]()
     for s, (sensor, rows, pose) in enumerate(zip(assumed.sensors, now.rows, now.poses, strict=True)):
         if rows is None:
             fits.append(None)
             continue
-        fit, probabilities, is_measured = _of_scan(sensor, rows, pose, labels, means, covs)
+        fit, probabilities, is_measured = _of_scan(sensor, rows, pose, labels, means, covs, seen)
         fits.append(fit)
         detected[:, s] = np.where(probabilities >= _MIN_DETECTION, is_measured, -1)
     return Compared(now.time, now.poses[:, :2], labels, means[:, :2], detected, tuple(fits))
 
 
-def _predicted(before: Instant, now: Instant, motion: MotionModel) -> tuple[Ints, Floats, Floats]:
-    """Return labels, means and covariances of the tracks of both estimates, predicted to the time of the second."""
+def _predicted(before: Instant, now: Instant, motion: MotionModel) -> tuple[Ints, Floats, Floats, Floats]:
+    """Return labels, means and covariances of the tracks of both estimates, predicted to the time of the second.
+
+    Also return the factors of their modes on the probability of detection.
+    """
     estimate, dt = before.estimate, now.time - before.time
     present = set(map(tuple, now.estimate.labels.tolist()))
     kept = [i for i, label in enumerate(estimate.labels.tolist()) if tuple(label) in present]
     labels, means, covs = estimate.labels[kept], estimate.means[kept], estimate.covs[kept]
     if not kept or dt <= 0.0:
-        return labels, means, covs
+        return labels, means, covs, np.ones(len(kept))
+    if not isinstance(motion, Modes):
+        return labels, *_moved(motion, means, covs, dt), np.ones(len(kept))
+    probs = estimate.mode_probs[kept]
+    known = np.pad(probs, ((0, 0), (0, len(motion.names) - probs.shape[1])))
+    known = known + (1.0 - known.sum(axis=1, keepdims=True)) * motion.at_birth  # new targets have no mode yet
+    shares = known @ mode_probabilities(motion.rates, dt)
+    ends, spreads = map(np.array, zip(*(_moved(own, means, covs, dt) for own in motion.in_common), strict=True))
+    moved = np.einsum("im,mid->id", shares, ends)
+    apart = ends - moved
+    spreads = spreads + apart[..., :, np.newaxis] * apart[..., np.newaxis, :]
+    return labels, moved, np.einsum("im,mide->ide", shares, spreads), shares @ motion.detection_factors
+
+
+def _moved(motion: MotionModel, means: Floats, covs: Floats, dt: float) -> tuple[Floats, Floats]:
+    """Return means and covariances `dt` seconds later."""
     moved, jacobians = _linearised(lambda states: motion.propagate(states, dt), means, covs, None)
-    return labels, moved, jacobians @ covs @ jacobians.transpose(0, 2, 1) + motion.noise_covs(means, dt)
+    return moved, jacobians @ covs @ jacobians.transpose(0, 2, 1) + motion.noise_covs(means, dt)
 
 
 def _linearised(
@@ -173,11 +193,11 @@ def _linearised(
 
 
 def _of_scan(
-    sensor: SensorModel, raw: ScanLike, pose: Floats, labels: Ints, means: Floats, covs: Floats
+    sensor: SensorModel, raw: ScanLike, pose: Floats, labels: Ints, means: Floats, covs: Floats, seen: Floats
 ) -> tuple[SensorFit, Floats, Bools]:
     """Return the fit of a scan, the probabilities of detection of the tracks, and whether they have measurements.
 
-    raw: measurements, with the noise of each if they bring any.
+    raw: measurements, with the noise of each if they bring any. seen: factors on the probability of detection.
     """
     measured, periods = values_of(raw), sensor.measurement.periods
     matches, explained = Matches.none(sensor.meas_dim), np.asarray(np.zeros(len(measured), np.bool_))
@@ -195,7 +215,10 @@ def _of_scan(
         own = inside[single].argmax(axis=1) if len(single) else single
         residuals[single] = wrap_periodic(measured[own] - expected[single], periods)
         variances[single] = np.diagonal(spreads[single, own], axis1=1, axis2=2)
-        probabilities, chance = sensor.mean_detection(means, covs, pose), _by_chance(sensor, expected, spread, pose)
+        probabilities, chance = (
+            seen * sensor.mean_detection(means, covs, pose),
+            _by_chance(sensor, expected, spread, pose),
+        )
         noises = np.diagonal(noise, axis1=1, axis2=2)
         columns = labels, means[:, :2] - pose[:2], probabilities, numbers, chance, residuals, variances, noises
         num, group = connected_components(_near(expected, spread, periods))

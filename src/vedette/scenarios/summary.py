@@ -73,6 +73,11 @@ def summary_rows(model: ScenarioModel) -> list[tuple[str, str]]:
 
 def _motion(section: Section) -> str:
     """Return its settings; the root of a spectral density has another unit than an acceleration."""
+    if modes := getattr(section, "modes", None):
+        stays = [(name, mode.stay_s) for name, mode in modes.items()]
+        return "modes " + ", ".join(
+            f"{name} (for ever)" if stay is None else f"{name} ({stay:g} s)" for name, stay in stays
+        )
     continuous = getattr(section, "noise_model", "") == "continuous_white"
     return describe_settings(section).replace("m/s^2", "m/s^1.5") if continuous else describe_settings(section)
 
