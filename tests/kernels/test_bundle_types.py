@@ -37,7 +37,7 @@ def test_what_changes_a_type_is_not_taken_for_the_same() -> None:
     bundle = kernel_motion(models.constant_velocity(1.0), models.constant_survival(0.9))
     fixed: Any = bundle.noise_params.copy()
     fixed.flags.writeable = False
-    others: list[Any] = [fixed, np.zeros(4)[::2], np.zeros(2, np.float32), np.zeros((2, 2))]
+    others: list[Any] = [fixed, np.zeros((4, 1))[::2], np.zeros((2, 1), np.float32), np.zeros(2)]
     for params in others:
         changed = bundle._replace(noise_params=params)
         assert typeof(changed) == slowly(changed) != typeof(bundle)

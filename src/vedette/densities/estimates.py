@@ -257,9 +257,10 @@ def at_dominant_components(density: LMB) -> LMB:
     The mean of two rival components may lie where the target cannot be, and their spread is an error that scans cannot
     reduce: after two targets have been close, no scan can distinguish their labels.
     """
-    tracks, num = over_modes(density.tracks), density.tracks.num_tracks
-    if len(tracks.log_weights) == num:
-        return density if tracks is density.tracks else density.with_fields(tracks=tracks)
+    num = density.tracks.num_tracks
+    if len(density.tracks.log_weights) == num:
+        return density
+    tracks = over_modes(density.tracks)
     peaks = heaviest_components(tracks.log_weights, tracks.offsets, np.arange(num))
     taken = taken_components(tracks.to_kernel().components, peaks)
     return density.with_fields(tracks=gaussian_tracks(tracks.labels, *taken[1:]))
