@@ -91,7 +91,7 @@ def test_the_layout_of_this_version_is_as_written_here():
         "fusion_num_sets fusion_num_lost_labels fusion_empty_intersection fusion_log_normaliser "
         "fusion_discarded_weight",
         "truth": "step time_s target state_*",
-        "tracks": "step time_s birth_step birth_site existence mean_* cov_* class_*",
+        "tracks": "step time_s birth_step birth_site existence mean_* cov_* class_* mode_*",
         "sensors": "step time_s sensor x_m y_m heading_rad log_likelihood num_hypotheses num_tracks "
         "truncation_error_bound dropped_existence num_clutter_floored num_duplicates num_inexact_clusters "
         "search_truncated limit_reached independence_error_bound num_missing_sets num_missing_labels "
