@@ -3,6 +3,7 @@
     python benchmarks/modes.py                        # 20 scenes of each kind
     python benchmarks/modes.py --scenes 4 --kinds boats hidden
     python benchmarks/modes.py --tune                 # also 7 noises of constant velocity, and the best of them
+    python benchmarks/modes.py --paper 60             # joint decisions on paper-a, whose targets turn
 
 Every scene is drawn: three to six targets, their places, courses and manoeuvres, the probability of detection (.7 to
 .98), clutter (2 to 20) and noise. `boats` turn 60 to 180 degrees at 5 to 15 degrees a second, `aircraft` at 2 to 4 g,
@@ -16,8 +17,9 @@ from __future__ import annotations
 import argparse
 import json
 import math
+import re
 import time
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -25,9 +27,12 @@ import numpy as np
 
 from vedette import models
 from vedette.densities.estimates import Estimate, best_estimate
-from vedette.evaluation.metrics import ospa
+from vedette.evaluation.metrics import ospa, ospa_of_run
 from vedette.filters import FactoredGlmbFilter, Limits
 from vedette.kernels.base.types import Floats
+from vedette.scenarios import Scenario, list_builtin, parse_scenario
+from vedette.scenarios.build import build_experiment, build_planner
+from vedette.simulation import simulate
 
 STEPS, SEED = 100, 61
 
@@ -198,6 +203,42 @@ def settings_of(scene: Scene, kind: str, tune: bool) -> dict[str, models.MotionM
     return {**velocity, "modes": modes_of(scene.speed, hides=kind == "hidden")}
 
 
+PAPER = """motion:
+  kind: modes
+  modes:
+    cruise: {motion: {kind: constant_velocity, sigma_v: 0.5}, stay_s: 20.0}
+    left: {motion: {kind: constant_turn, turn_rate_deg: 15.0, sigma_v: 1.0}, stay_s: 8.0, to: {cruise: 1.0}}
+    right: {motion: {kind: constant_turn, turn_rate_deg: -15.0, sigma_v: 1.0}, stay_s: 8.0, to: {cruise: 1.0}}
+"""
+
+
+def paper(num_runs: int) -> None:
+    """Compare joint decisions on paper-a, whose targets turn: filters with modes and with constant velocities."""
+    text, motions = list_builtin()["paper-a"].read_text("utf-8"), {"modes": PAPER}
+    text = re.sub(r"(- \{state: \[[^\]]*\])\}", r"\1, process_noise: true}", text)
+    for noise in (1.0, 2.0, 5.0):
+        motions[f"constant velocity {noise:g}"] = f"motion: {{kind: constant_velocity, sigma_v: {noise}}}\n"
+    scenarios = {
+        name: Scenario(parse_scenario(re.sub(r"motion:\n(?:  .*\n)+", lambda _, own=own: own, text, count=1)))
+        for name, own in motions.items()
+    }
+    experiments, errors = {name: build_experiment(own) for name, own in scenarios.items()}, dict[str, list[float]]()
+    for run in range(num_runs):
+        for name, own in experiments.items():
+            planner, alike = (
+                build_planner(scenarios[name], "jdm", 1),
+                replace(own, targets=experiments["modes"].targets),
+            )
+            record = simulate(alike, planner, seed=SEED, run=run, score=None)
+            series = ospa_of_run(record.truth, record.estimates, cutoff=100.0, order=1.0)
+            errors.setdefault(name, []).append(float(np.mean(series[10:])))
+    print(f"\npaper-a with targets that turn, joint decisions, {num_runs} paired runs: mean OSPA from scan 11 on, m")
+    for name, values in errors.items():
+        apart = np.array(values) - errors["modes"]
+        error = apart.std(ddof=1) / math.sqrt(num_runs)
+        print(f"  {name:24} {np.mean(values):6.2f}  difference to modes {apart.mean():+.2f} +- {error:.2f}")
+
+
 def _mean(values: Floats) -> float:
     return float(np.nanmean(values)) if np.isfinite(values).any() else math.nan
 
@@ -209,7 +250,11 @@ def main() -> None:
     parser.add_argument("--kinds", nargs="+", choices=KINDS, default=KINDS)
     parser.add_argument("--tune", action="store_true")
     parser.add_argument("--out", type=Path)
+    parser.add_argument("--paper", type=int, metavar="RUNS")
     options = parser.parse_args()
+    if options.paper:
+        paper(options.paper)
+        return
     for kind in options.kinds:
         rows: dict[str, list[Any]] = {}
         for number in range(options.first, options.first + options.scenes):
