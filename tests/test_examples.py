@@ -86,6 +86,7 @@ SHOWN = {
     "docs/late-scans.md": ["5 scans, 1 late, 0 dropped", "at 10.0 s"],
     "docs/live.md": ['"line": 12, "time": 5.0, "tracks": [{"label":'],
     "docs/loop.md": ["go to"],
+    "docs/manoeuvres.md": ["[0.971 0.029]"],
     "docs/metrics.md": ["True"],
     "docs/platforms.md": ["('dx', 'dy', 'pointing_deg') 12"],
     "docs/radio-networks.md": ["the boats are sure of 1 and 1 ships"],

@@ -39,9 +39,9 @@ y_max: 50.0 -> y_max: .nan
 region: {x_min: -100.0, x_max: 100.0, y_min: -50.0, y_max: 50.0} -> region: [1, 2]
     3:9: region: expected a mapping, got a list of 2
 kind: constant_velocity -> kind: constant_speed
-    4:16: motion.kind: expected one of constant_velocity, constant_velocity_height, coordinated_turn, custom, got "constant_speed"
+    4:16: motion.kind: expected one of constant_acceleration, constant_turn, constant_velocity, constant_velocity_height, coordinated_turn, modes, ornstein_uhlenbeck, random_walk, custom, got "constant_speed" (did you mean constant_turn?)
 kind: constant_velocity, sigma_v -> sigma_v
-    4:9: motion: expected a mapping with kind: one of constant_velocity, constant_velocity_height, coordinated_turn, custom, got no kind
+    4:9: motion: expected a mapping with kind: one of constant_acceleration, constant_turn, constant_velocity, constant_velocity_height, coordinated_turn, modes, ornstein_uhlenbeck, random_walk, custom, got no kind
 sigma_v: 1.0 -> sigma_v: -1.0
     4:44: motion.sigma_v: expected a number of at least 0, got -1.0
 {kind: constant_velocity, sigma_v: 1.0} -> {kind: coordinated_turn}

@@ -27,7 +27,6 @@ from vedette.kernels.base.types import Ints, Lmb, Measurements, Motion, ScanInpu
 from vedette.models import (
     SensorModel,
     TargetModel,
-    check_room_for_modes,
     constant_detection,
     constant_noise,
     measurement_space_clutter,
@@ -37,6 +36,7 @@ from vedette.models import (
 )
 from vedette.models.arguments import generator, pose_vector, positive, step_number
 from vedette.models.fields import check_fields
+from vedette.models.modes import check_room_for_modes
 from vedette.models.scan_rows import to_measurements
 from vedette.models.sensor import with_default_detection_at
 

@@ -24,9 +24,10 @@ from vedette.filters.inputs import check_belief, check_scan, is_zero_duration, m
 from vedette.filters.limits import Limits
 from vedette.filters.protocols import FilterInfo
 from vedette.kernels.base.types import Bools, Floats, Ints, Lmb, Measurements, Motion, ScanInput
-from vedette.models import SensorModel, TargetModel, check_room_for_modes, motion_of_filter, sensor_of_filter
+from vedette.models import SensorModel, TargetModel, motion_of_filter, sensor_of_filter
 from vedette.models.arguments import generator, one_a_sensor, pose_vector, positive, reject, step_number
 from vedette.models.fields import check_fields
+from vedette.models.modes import check_room_for_modes
 from vedette.models.sensor import with_default_detection_at
 
 

@@ -25,7 +25,7 @@ from vedette.models.heights import (
 from vedette.models.kinematics import constant_velocity, constant_velocity_height, coordinated_turn
 from vedette.models.manoeuvres import constant_acceleration, constant_turn, ornstein_uhlenbeck, random_walk
 from vedette.models.measurement import MeasurementModel, NoiseModel, position
-from vedette.models.modes import Modes, check_room_for_modes, motion_of_filter, sensor_of_filter
+from vedette.models.modes import Modes, motion_of_filter, sensor_of_filter
 from vedette.models.motion import MotionModel, SurvivalModel, constant_survival, kernel_motion
 from vedette.models.noise import axis_noise, constant_noise, range_dependent_noise
 from vedette.models.polar import bearing_only, bearing_range, bearing_range_rate, range_only
@@ -69,7 +69,6 @@ __all__ = [
     "bearing_range_rate",
     "bearing_slant_range",
     "camera",
-    "check_room_for_modes",
     "constant_acceleration",
     "constant_detection",
     "constant_noise",
