@@ -43,13 +43,13 @@ from vedette.models.sensor import with_default_detection_at
 BeliefT = TypeVar("BeliefT", bound=LabelledDensity)
 
 
-StepInputs: TypeAlias = tuple[ScanInput, Motion | None, Sensor, Truncation]
+StepInputs: TypeAlias = tuple[ScanInput, Motion, Sensor, Truncation]
 
 
 class SensorStep(NamedTuple):
     """Inputs of one update with the scan of one sensor.
 
-    inputs: in kernel form. The motion is None for a scan at the time of the belief. limits: caps and thresholds.
+    inputs: in kernel form. For a scan at the time of the belief its `dt` is 0. limits: caps and thresholds.
     sensor: the sensor of the scan.
     num_scans: number of scans at this time that update the belief. rng: None if nothing is drawn.
     """
@@ -145,9 +145,9 @@ class SingleSensorFilter(WithBirths):
 
     def _update_inputs(self, scan: Measurements, pose: Any) -> StepInputs:
         """Return the inputs of `_inputs_after` for a scan at the time of the prior."""
-        _, sensor, truncation = _models(self.targets, self.sensor, self.limits)
+        motion, sensor, truncation = _models(self.targets, self.sensor, self.limits)
         given = ScanInput(no_births_for_kernel(self.targets.state_dim), scan, pose_vector("pose", pose), 0.0)
-        return given, None, sensor, truncation
+        return given, motion, sensor, truncation
 
 
 @lru_cache(maxsize=1000)

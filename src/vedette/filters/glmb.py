@@ -123,7 +123,7 @@ class DeltaGlmbFilter(_GlmbFilterBase, LabelledFilter[GLMB]):
 
     def _run_kernel(self, prior: Glmb, step: SensorStep) -> tuple[Glmb, StepReport]:
         scan, motion, sensor, truncation = step.inputs
-        if isinstance(self.assignment, Gibbs) and motion is not None and step.rng is not None:
+        if isinstance(self.assignment, Gibbs) and scan.dt > 0.0 and step.rng is not None:
             return step_gibbs(prior, scan, motion, sensor, truncation, int(self.assignment.num_samples), step.rng)
         return step_ranked(prior, *step.inputs)
 

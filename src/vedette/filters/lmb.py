@@ -78,8 +78,8 @@ class LmbFilter(LmbFilterBase, LabelledFilter[LMB]):
         return LmbFilter(self.targets, blind_sensor(), Limits.none())
 
     def _run_kernel(self, prior: Lmb, step: SensorStep) -> tuple[Lmb, LmbReport]:
-        association, (_, motion, _, _) = self.assignment.to_kernel(), step.inputs
-        if association is None and motion is None:
+        association = self.assignment.to_kernel()
+        if association is None and step.inputs[0].dt == 0.0:
             return _by_combinations(prior, step)
         return step_lmb(prior, *step.inputs, step.limits.reduction(), association)
 
@@ -119,7 +119,7 @@ class SequentialLmbFilter(LmbFilterBase, SequentialUpdate[LMB]):
 def _by_combinations(prior: Lmb, step: SensorStep) -> tuple[Lmb, LmbReport]:
     """Update by the exact sums of the multi-sensor filter, which drop surely improbable terms (docs/decisions/0014)."""
     scan, motion, sensor, truncation = step.inputs
-    before = standing_combinations(prior, 1) if motion is None else predict_combinations(prior, scan, 1, motion)
+    before = standing_combinations(prior, 1) if scan.dt == 0.0 else predict_combinations(prior, scan, 1, motion)
     return update_lmb(before, scan, sensor, truncation, step.limits.reduction())
 
 

@@ -128,9 +128,9 @@ class MultiSensorFilter(LabelledFilterBase[BeliefT]):
         born = self._births(period, step, prior, births)
         return self._updated(self._before_scan(prior, period, step, births), born, taken, period, f"step {step}")
 
-    def _motion(self, dt: float) -> Motion | None:
-        """Return the motion in kernel form, or None for scans at the time of the belief."""
-        return motion_of_filter(self.targets.motion, self.targets.survival) if dt > 0.0 else None
+    def _motion(self) -> Motion:
+        """Return the motion in kernel form."""
+        return motion_of_filter(self.targets.motion, self.targets.survival)
 
     @abstractmethod
     def _updated(self, prior: Any, born: Lmb, taken: SensorScans, dt: float, place: str) -> tuple[BeliefT, FilterInfo]:
@@ -167,14 +167,14 @@ class SequentialUpdate(MultiSensorFilter[BeliefT]):
     """
 
     def _updated(self, prior: Any, born: Lmb, taken: SensorScans, dt: float, place: str) -> tuple[BeliefT, FilterInfo]:
-        motion, posterior = self._motion(dt), prior
+        motion, posterior = self._motion(), prior
         keeping, settled = self.limits.keeping_labels(), np.zeros(0, np.bool_)
         reports, log_total, last = list[Any](), 0.0, len(taken.names) - 1
         given = zip(taken.names, taken.sensors, taken.sequential_inputs(born, dt), strict=True)
         for s, (name, sensor, scan) in enumerate(given):
             limits = step_limits(self, sensor) if s == last else keeping
             own = sensor_of_filter(sensor, self.targets.motion), limits.truncation(sensor.meas_dim)
-            step = SensorStep((scan, motion if s == 0 else None, *own), limits, sensor, len(taken.names))
+            step = SensorStep((scan, motion, *own), limits, sensor, len(taken.names))
             with model_errors():
                 if s in (0, last):  # the last update decides for every label whether it is kept
                     posterior, report = self._run_kernel(posterior, step)

@@ -42,14 +42,13 @@ class MultiSensorLmbFilter(LmbFilterBase, MultiSensorFilter[LMB]):
 
     def _updated(self, prior: Lmb, born: Lmb, taken: SensorScans, dt: float, place: str) -> tuple[LMB, FilterInfo]:
         limits, num_columns, reports = step_limits(self, self.sensors[0]), 0, []
-        motion, before = self._motion(dt), prior
         reduction = limits.reduction()
         with model_errors():
             inputs = taken.inputs(born, dt)
-            if motion is None:
-                combinations = standing_combinations(before, len(inputs))
+            if dt == 0.0:
+                combinations = standing_combinations(prior, len(inputs))
             else:
-                combinations = predict_combinations(before, inputs[0], len(inputs), motion)
+                combinations = predict_combinations(prior, inputs[0], len(inputs), self._motion())
             for s, (sensor, scan) in enumerate(zip(taken.sensors, inputs, strict=True)):
                 truncation = limits.truncation(sensor.meas_dim)
                 seen = sensor_of_filter(sensor, self.targets.motion)

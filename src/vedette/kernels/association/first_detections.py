@@ -20,7 +20,7 @@ from vedette.kernels.association.assignment import ABSENT, Options
 from vedette.kernels.association.gating import near_measurements
 from vedette.kernels.association.joined_rows import copy_entry
 from vedette.kernels.association.options import Sight, make_room, room_for_updated, sort_row, weigh_detection
-from vedette.kernels.association.predicted import Rows, make_rows, rows_of_scan
+from vedette.kernels.association.predicted import Rows, make_rows, standing_rows_of_scan
 from vedette.kernels.base.arrays import counted_ints, group_members
 from vedette.kernels.base.compile import borrowing, kernel
 from vedette.kernels.base.types import Floats, Ints, Mixture, ScanInput, Sensor, Tracks
@@ -65,7 +65,7 @@ def seen_intensity(intensity: Mixture, scan: ScanInput, sensor: Sensor) -> Rows:
     """
     num = len(intensity.log_weights)
     each = Tracks(np.zeros((num, 2), np.int64), counted_ints(num + 1), intensity)
-    return rows_of_scan(each, scan, None, sensor)
+    return standing_rows_of_scan(each, scan, sensor)
 
 
 @kernel

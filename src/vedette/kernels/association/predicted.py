@@ -124,13 +124,11 @@ def leave_unseen(rows: Rows) -> None:
 
 
 @kernel
-def rows_of_scan(tracks: Tracks, scan: ScanInput, motion: Motion | None, sensor: Sensor) -> Rows:
-    """Return the result of `predict_rows` in new arrays. motion: None if the tracks are at the time of the scan."""
+def rows_of_scan(tracks: Tracks, scan: ScanInput, motion: Motion, sensor: Sensor) -> Rows:
+    """Return the result of `predict_rows` in new arrays, for a `dt` of 0 of tracks that are at the time of the scan."""
     sites, state_dim, meas_dim = scan.birth.tracks, tracks.components.means.shape[1], len(sensor.periods)
-    if motion is None:
-        standing = standing_rows(tracks, meas_dim)
-        expect_rows(sensor, scan, standing, make_scratch(state_dim, meas_dim))
-        return standing
+    if scan.dt == 0.0:
+        return standing_rows_of_scan(tracks, scan, sensor)
     if len(motion.transition_params) > 1:
         branched = branched_rows(tracks, scan, motion, meas_dim)
         expect_rows(sensor, scan, branched, make_scratch(state_dim, meas_dim))
@@ -150,6 +148,14 @@ def standing_rows(tracks: Tracks, meas_dim: int) -> Rows:
     rows = make_rows(len(tracks.labels), num, tracks.components, meas_dim)
     _copy_tracks(tracks, rows)
     rows.log_absent[:] = -math.inf
+    return rows
+
+
+@kernel
+def standing_rows_of_scan(tracks: Tracks, scan: ScanInput, sensor: Sensor) -> Rows:
+    """Return the tracks unchanged as rows, with the expected measurement of each."""
+    rows = standing_rows(tracks, len(sensor.periods))
+    expect_rows(sensor, scan, rows, make_scratch(tracks.components.means.shape[1], len(sensor.periods)))
     return rows
 
 

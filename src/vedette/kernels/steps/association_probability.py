@@ -7,11 +7,10 @@ import math
 import numpy as np
 
 from vedette.kernels.association.options import weighed_options
-from vedette.kernels.association.predicted import expect_rows, standing_rows
+from vedette.kernels.association.predicted import standing_rows_of_scan
 from vedette.kernels.association.truncation import Truncation
 from vedette.kernels.base.compile import kernel
 from vedette.kernels.base.types import Floats, Lmb, ScanInput, Sensor
-from vedette.kernels.gaussian.scratch import make_scratch
 from vedette.kernels.steps.field_of_view import in_view, marked
 from vedette.kernels.steps.lmb import weigh_by_existence
 
@@ -23,8 +22,7 @@ def prob_explained(belief: Lmb, scan: ScanInput, sensor: Sensor, truncation: Tru
     sum over labels of r <p, p_D g(z | .)> / (kappa(z) + the same sum).
     """
     seen = marked(belief, in_view(belief.tracks, scan, sensor, truncation))
-    rows = standing_rows(seen.tracks, len(sensor.periods))
-    expect_rows(sensor, scan, rows, make_scratch(belief.tracks.components.means.shape[1], len(sensor.periods)))
+    rows = standing_rows_of_scan(seen.tracks, scan, sensor)
     weigh_by_existence(seen.existence_logit, rows)
     options, _, _ = weighed_options(rows, scan, sensor, truncation)
     odds = np.zeros(len(scan.measurements.values))

@@ -158,7 +158,7 @@ def _bounded(existence_logit: Floats, most: float) -> tuple[Floats, float]:
 def step_cb_member(
     prior: Lmb,
     scan: ScanInput,
-    motion: Motion | None,
+    motion: Motion,
     sensor: Sensor,
     truncation: Truncation,
     reduction: Reduction,

@@ -203,7 +203,7 @@ def step_cphd(
     log_cardinality: Floats,
     prior: Mixture,
     scan: ScanInput,
-    motion: Motion | None,
+    motion: Motion,
     sensor: Sensor,
     truncation: Truncation,
     caps: MixtureCaps,

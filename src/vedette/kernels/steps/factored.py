@@ -103,7 +103,7 @@ def _associate(
     prior: FactoredGlmb,
     undetected: Undetected,
     scan: ScanInput,
-    motion: Motion | None,
+    motion: Motion,
     sensor: Sensor,
     truncation: Truncation,
     least_logit: float,
@@ -174,7 +174,7 @@ def step_factored(
     undetected: Undetected,
     arrivals: Arrivals,
     scan: ScanInput,
-    motion: Motion | None,
+    motion: Motion,
     sensor: Sensor,
     truncation: Truncation,
     reduction: Reduction,
@@ -184,9 +184,9 @@ def step_factored(
 
     Also return the intensity of targets that stay undetected, and the cells.
 
-    undetected: before the scan. arrivals: since then. motion: None for a scan at the time of the prior, without births.
+    undetected: before the scan. arrivals: since then. At the time of the prior, the scan has a `dt` of 0 and no births.
     """
-    if motion is not None:
+    if scan.dt > 0.0:
         undetected = predicted_undetected(undetected, motion, scan.dt, arrivals)
     found = _associate(prior, undetected, scan, motion, sensor, truncation, reduction.min_existence_logit)
     background = background_of(undetected)

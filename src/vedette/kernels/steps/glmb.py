@@ -86,9 +86,7 @@ def parents_with_births(prior: Glmb, num_births: int) -> Parents:
 
 
 @kernel
-def _associate(
-    prior: Glmb, scan: ScanInput, motion: Motion | None, sensor: Sensor, truncation: Truncation
-) -> Associated:
+def _associate(prior: Glmb, scan: ScanInput, motion: Motion, sensor: Sensor, truncation: Truncation) -> Associated:
     """Weigh the options of each row: the tracks of the prior, then birth sites."""
     rows = rows_of_scan(prior.tracks, scan, motion, sensor)
     options, log_clutter, num_raised = weighed_options(rows, scan, sensor, truncation)
@@ -164,11 +162,11 @@ def _conclude(
 
 @kernel
 def step_ranked(
-    prior: Glmb, scan: ScanInput, motion: Motion | None, sensor: Sensor, truncation: Truncation
+    prior: Glmb, scan: ScanInput, motion: Motion, sensor: Sensor, truncation: Truncation
 ) -> tuple[Glmb, StepReport]:
     """Predict and update with one scan, with exactly ranked hypotheses.
 
-    motion: None for a scan at the time of the prior, which has no births.
+    scan: its `dt` is 0 at the time of the prior, without births then.
     """
     found = _associate(prior, scan, motion, sensor, truncation)
     children, cut = rank_children(found.options, found.parents, truncation.search)

@@ -171,7 +171,7 @@ def append_reduced(wide: Mixture, width: int, caps: MixtureCaps, work: Reduction
 def step_lmb(
     prior: Lmb,
     scan: ScanInput,
-    motion: Motion | None,
+    motion: Motion,
     sensor: Sensor,
     truncation: Truncation,
     reduction: Reduction,
@@ -179,7 +179,7 @@ def step_lmb(
 ) -> tuple[Lmb, LmbReport]:
     """Predict and update with one scan.
 
-    motion: None for a scan at the time of the prior, which has no births. association: None for the sums over clusters.
+    scan: its `dt` is 0 at the time of the prior, without births then. association: None for the sums over clusters.
     """
     rows = rows_of_scan(prior.tracks, scan, motion, sensor)
     weigh_by_existence(prior.existence_logit, rows)

@@ -34,9 +34,7 @@ class IntensityReport(NamedTuple):
 
 
 @kernel
-def predict_intensity(
-    prior: Mixture, scan: ScanInput, motion: Motion | None, sensor: Sensor
-) -> tuple[Rows, float, int]:
+def predict_intensity(prior: Mixture, scan: ScanInput, motion: Motion, sensor: Sensor) -> tuple[Rows, float, int]:
     """Return the predicted intensity as one row, survivors before births.
 
     Also return the log of the weight that died, and the number of components of survivors.
@@ -82,7 +80,7 @@ def corrected_intensity(rows: Rows, options: Options, log_factors: Floats, caps:
 
 @kernel
 def step_phd(
-    prior: Mixture, scan: ScanInput, motion: Motion | None, sensor: Sensor, truncation: Truncation, caps: MixtureCaps
+    prior: Mixture, scan: ScanInput, motion: Motion, sensor: Sensor, truncation: Truncation, caps: MixtureCaps
 ) -> tuple[Mixture, IntensityReport]:
     """Predict and update with one scan (Vo and Ma 2006, Propositions 1 and 2).
 
