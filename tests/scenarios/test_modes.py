@@ -147,7 +147,7 @@ def test_the_fit_predicts_by_modes():
     ends, spreads = [], []
     for motion in motions:
         slope = np.empty((4, 4))
-        motion.transition_jacobian(mean, dt, motion.transition_params, slope)
+        motion.transition_jacobian(mean, dt, motion.transition_params, slope)  # type: ignore[misc]
         ends.append(slope @ mean)
         spreads.append(slope @ cov @ slope.T + motion.noise_cov(mean, dt))
     wanted = shares @ np.array(ends)
