@@ -16,6 +16,7 @@ from reference import Floats, gaussian
 from reference import glmb as oracle
 from vedette import models
 from vedette.densities import LabelledDensity, as_glmb, as_lmb
+from vedette.errors import InputError
 from vedette.filters import (
     CbMemberFilter,
     CphdFilter,
@@ -138,6 +139,35 @@ def test_probabilities_of_modes_are_the_exponential():
         rates -= np.diag(rates.sum(axis=1))
         for dt in (1e-9, 0.01, 1.0, 30.0):
             np.testing.assert_allclose(mode_probabilities(rates, dt), expm(rates * dt), rtol=0, atol=1e-13)
+
+
+def test_modes_after_a_long_time_do_not_depend_on_the_first():
+    rates = np.array([[-0.2, 0.2], [0.05, -0.05]])
+    for dt in (1e3, 1e5, 1e9):
+        np.testing.assert_allclose(mode_probabilities(rates, dt), [[0.2, 0.8]] * 2, rtol=1e-10)
+
+
+@models.model_function("transition")
+def drifting(state, dt, params, out):
+    out[0], out[1] = state[0] + dt * params[0], state[1]
+
+
+@models.model_function("process_noise_cov")
+def diffusing(state, dt, params, out):
+    out[0, 0] = out[1, 1] = dt * params[0]
+    out[0, 1] = out[1, 0] = 0.0
+
+
+def test_own_motions_are_modes_if_they_differ_in_parameters():
+    slow, fast = (models.MotionModel(2, drifting, diffusing, np.array([v]), np.array([1.0])) for v in (1.0, 9.0))
+    modes = models.Modes((slow, fast), (10.0, 30.0))
+    np.testing.assert_array_equal(modes.propagate([[0.0, 0.0]], 2.0), [[18.0, 0.0]])
+    rows = models.motion_of_filter(modes, models.constant_survival(1.0)).transition_params
+    np.testing.assert_array_equal(rows, [[1.0], [9.0]])
+    with pytest.raises(
+        InputError, match=r"motions\[0\]: expected a built-in motion, or in all modes the same functions"
+    ):
+        models.Modes((slow, models.random_walk(1.0)), (10.0, 30.0))
 
 
 def interacting_multiple_model(modes: models.Modes, scans: Floats, times: Floats, birth: Any, noise: Floats) -> Any:

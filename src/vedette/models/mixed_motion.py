@@ -215,6 +215,11 @@ def _noise(state: Floats, dt: float, params: Floats, out: Floats) -> None:
                 out[i, j] -= (mean[i] - state[i]) * (mean[j] - state[j])
 
 
+def is_built_in(motion: MotionModel) -> bool:
+    """Return True if a motion may be part of a mixture."""
+    return motion.transition in _KINDS and motion.process_noise_cov in _NOISES
+
+
 def mixed_motion(
     motions: Sequence[MotionModel], shares: Floats, method: str = "auto", components: tuple[str, ...] = ()
 ) -> MotionModel:
@@ -226,7 +231,7 @@ def mixed_motion(
     for i, (motion, share) in enumerate(zip(motions, shares, strict=True)):
         if share == 0.0:
             continue
-        if motion.transition not in _KINDS or motion.process_noise_cov not in _NOISES:
+        if not is_built_in(motion):
             expected = "a built-in motion, or in all modes the same functions and components"
             raise reject(f"motions[{i}]", expected, motion.transition)
         kind, noise = _KINDS.index(motion.transition), _NOISES.index(motion.process_noise_cov)

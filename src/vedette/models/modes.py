@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 
 from vedette.kernels.base.types import Floats, Motion, Sensor, Switching, common_components
 from vedette.models.arguments import float_array, instance, is_infinite, non_negative, reject
-from vedette.models.mixed_motion import mixed_motion
+from vedette.models.mixed_motion import is_built_in, mixed_motion
 from vedette.models.motion import MotionModel, SurvivalModel, kernel_motion
 from vedette.models.sensor import SensorModel
 
@@ -24,10 +24,10 @@ class Modes(MotionModel):
     moves and is seen as if it had none. States have the components of all motions, by name. A motion leaves those that
     it does not have as they are. Filters with labels and without keep components of each mode. As a `MotionModel` by
     itself, for planners, it is the mixture of all motions, with the long-term probabilities of the modes, as one
-    Gaussian of the same moments.
+    Gaussian of the same moments, and of own motions the most frequent one.
 
     Args:
-        motions: motion in each mode. They are built-in models, or have the same functions and components.
+        motions: motion in each mode. They are built-in models, or own ones of the same functions and components.
         stay_s: (num_modes,) mean time in each mode, s. inf: for ever.
         names: of the modes, for outputs. (): their numbers.
         to: (num_modes, num_modes) probability of each next mode (column) after a mode (row). None: all others alike.
@@ -86,12 +86,19 @@ class Modes(MotionModel):
         if (factors < 0.0).any() or (factors > 1.0).any():
             raise reject("Modes.detection_factors", "numbers in [0, 1]", factors.tolist())
         reach = np.inf if is_infinite(merge_distance) else non_negative("Modes.merge_distance", merge_distance)
-        mean = given[0] if _are_alike(given) and num == 1 else mixed_motion(given, often, method)
+        mean = _mixture(given, often, method)
         MotionModel.__init__(self, *(getattr(mean, name) for name in MotionModel.__match_args__))
         common = given if _are_alike(given) else _in_common(given, method)
         own = {"motions": given, "in_common": common, "names": names, "rates": rates, "merge_distance": reach}
         for name, value in {**own, "at_birth": birth / birth.sum(), "detection_factors": factors}.items():
             object.__setattr__(self, name, value)
+
+
+def _mixture(motions: Sequence[MotionModel], shares: Floats, method: str) -> MotionModel:
+    """Return one motion in place of all: their mixture, or of own motions the most frequent one."""
+    if _are_alike(motions) and (len(motions) == 1 or not is_built_in(motions[0])):
+        return motions[int(shares.argmax())]
+    return mixed_motion(motions, shares, method)
 
 
 def _are_alike(motions: Sequence[MotionModel]) -> bool:

@@ -31,27 +31,40 @@ def mode_probabilities(rates: Floats, dt: float) -> Floats:
     """Return exp(rates dt), the probability of each mode (column) `dt` seconds after each mode (row).
 
     By uniformisation: the modes after a Poisson number of steps of a chain, with the rate of the fastest change, whose
-    steps may stay. All terms are positive.
+    steps may stay. All terms are positive. A time of several changes is halved first, and the result squared.
     """
-    num, fastest = len(rates), 0.0
+    num, fastest, halvings = len(rates), 0.0, 0
     for i in range(num):
         fastest = max(fastest, -rates[i, i])
+    while fastest * dt > 1.0:
+        dt, halvings = 0.5 * dt, halvings + 1
     step, term = np.zeros((num, num)), np.zeros((num, num))
     for i in range(num):
         term[i, i] = math.exp(-fastest * dt)
         for j in range(num):
             step[i, j] = (1.0 if i == j else 0.0) + (rates[i, j] / fastest if fastest > 0.0 else 0.0)
     total, changes = term.copy(), 0
-    while changes < fastest * dt or term.max() > 1e-17:
+    while term.max() > 1e-17:
         changes += 1
-        following = np.zeros((num, num))
-        for i in range(num):
-            for j in range(num):
-                for k in range(num):
-                    following[i, j] += term[i, k] * step[k, j] * fastest * dt / changes
-        term = following
+        term = _product(term, step, fastest * dt / changes)
         total += term
+    for _ in range(halvings):
+        total = _product(total, total, 1.0)
+        for i in range(num):
+            total[i] /= total[i].sum()  # squaring doubles the rounding error of the sums
     return total
+
+
+@kernel
+def _product(first: Floats, second: Floats, factor: float) -> Floats:
+    """Return the product of two square matrices times a number, without BLAS, whose sums depend on the threads."""
+    num = len(first)
+    out = np.zeros((num, num))
+    for i in range(num):
+        for j in range(num):
+            for k in range(num):
+                out[i, j] += first[i, k] * second[k, j] * factor
+    return out
 
 
 @kernel
