@@ -297,7 +297,7 @@ def unlabelled_estimate(density: Poisson | IidCluster | MultiBernoulli, step: in
 
 def _without_modes(density: Any) -> Any:
     """Return an unlabelled density whose near components of different modes are one."""
-    plain = without_modes(density.to_kernel() if isinstance(density, Poisson) else density._components())
+    plain = without_modes(density._components())
     if isinstance(density, MultiBernoulli):
         own = Tracks(np.zeros((len(density.existence_logit), 2), np.int64), for_kernel(density.offsets), plain)
         _, offsets, plain = reduced_tracks(own, OF_ANY_MODE)

@@ -217,6 +217,8 @@ def over_modes(tracks: TrackTable) -> TrackTable:
 
 def mode_probabilities(tracks: TrackTable) -> Floats:
     """Return the probability of each mode of each track, (num_tracks, number of modes that occur)."""
+    if tracks.marks.modes.shape[1] == 0:
+        return np.empty((tracks.num_tracks, 0))
     modes = tracks.marks.modes.reshape(-1)
     table = np.zeros((tracks.num_tracks, modes.max(initial=NOT_DRAWN) + 1))
     owner, drawn = np.repeat(np.arange(tracks.num_tracks), np.diff(tracks.offsets)), np.flatnonzero(modes != NOT_DRAWN)
