@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from vedette.densities import IidCluster, Marks, MultiBernoulli, Poisson, unlabelled_estimate
+from vedette.densities import IidCluster, MultiBernoulli, Poisson, marks_of, unlabelled_estimate
 
 MEANS = np.array([[0.0, 0.0], [0.1, 0.0], [50.0, 0.0], [50.1, 0.0]])
-PARTS = MEANS, np.tile(np.eye(2), (4, 1, 1)), Marks(np.empty((4, 0)), np.array([[0], [1], [0], [1]]))
+PARTS = MEANS, np.tile(np.eye(2), (4, 1, 1)), marks_of(modes=np.array([0, 1, 0, 1]))
 HALVES = np.log(np.full(4, 0.5))
 
 

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 
 from densities.examples import glmbs, lmbs, poissons, random_glmb, random_lmb
-from vedette.densities import GLMB, LMB, FactoredGLMB, Marks, Poisson, TrackTable, load_density, save_density
+from vedette.densities import GLMB, LMB, FactoredGLMB, Poisson, TrackTable, load_density, save_density
 from vedette.errors import InputError
 
 
@@ -17,8 +17,8 @@ def _arrays(density):
     found: dict = {}
     for field in fields(density):
         value = getattr(density, field.name)
-        if isinstance(value, TrackTable | Marks):
-            found |= _arrays(value) if isinstance(value, TrackTable) else value._asdict()
+        if isinstance(value, TrackTable):
+            found |= _arrays(value)
         elif value is not None:
             found[field.name] = value
     return found

@@ -13,7 +13,7 @@ import pytest
 
 from densities.examples import random_glmb, random_lmb
 from filters.examples import linear_scene
-from vedette.densities import GLMB, LMB, FactoredGLMB, IidCluster, Marks, MultiBernoulli, Poisson, TrackTable
+from vedette.densities import GLMB, LMB, FactoredGLMB, IidCluster, MultiBernoulli, Poisson, TrackTable
 from vedette.densities.containers import for_kernel, unchecked
 from vedette.errors import InputError
 from vedette.filters import DeltaGlmbFilter, LmbFilter
@@ -39,8 +39,7 @@ def densities() -> list[Any]:
 
 
 def arrays(density: Any) -> dict[str, Any]:
-    marks = [f"marks.{name}" for name in Marks._fields] if hasattr(density, "marks") else []
-    found = {name: attrgetter(name)(density) for name in (*density.__match_args__, *marks)}
+    found = {name: getattr(density, name) for name in density.__match_args__}
     return {name: value for name, value in found.items() if isinstance(value, np.ndarray)}
 
 

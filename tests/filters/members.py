@@ -13,7 +13,6 @@ from vedette.densities import (
     LMB,
     FactoredGLMB,
     IidCluster,
-    Marks,
     MultiBernoulli,
     Poisson,
     cardinality_distribution,
@@ -152,5 +151,4 @@ def arrays(belief: Any) -> list[Any]:
     if undetected is not None:
         own += [*undetected.intensity.to_kernel(), np.array(undetected.next_label)]
         own += [] if undetected.cells is None else [undetected.cells.expected]
-    parts = [part for part in (*own, *(getattr(belief, name) for name in names)) if part is not None]
-    return [array for part in parts for array in (part if isinstance(part, Marks) else [part])]
+    return [part for part in (*own, *(getattr(belief, name) for name in names)) if part is not None]

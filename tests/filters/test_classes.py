@@ -14,7 +14,7 @@ from filters.members import BELIEFS, CENTRAL, NEAR, UNLABELLED, arrays, birth, c
 from filters.test_histories import followed, weights_of
 from reference import glmb as oracle
 from vedette import models
-from vedette.densities import GLMB, LMB, FactoredGLMB, Marks, Poisson, as_lmb, load_density, save_density
+from vedette.densities import GLMB, LMB, FactoredGLMB, Poisson, as_lmb, load_density, marks_of, save_density
 from vedette.errors import InputError
 from vedette.filters import DeltaGlmbFilter, FactoredGlmbFilter, Limits, MultiSensorGlmbFilter, SequentialFactoredFilter
 from vedette.models import ScanRows
@@ -77,7 +77,7 @@ def test_weights_and_classes_are_those_of_the_enumeration(name: str) -> None:
         belief, _ = tracker.step(belief, with_features(scan, features[-1]), scene.pose, DT, number, rng=RNG)
         histories = followed(belief, histories)
         assert weights_of(belief, histories) == pytest.approx(expected, abs=1e-10)
-        for history, probs in zip(histories, np.exp(belief.tracks.marks.log_class_probs), strict=True):
+        for history, probs in zip(histories, np.exp(belief.tracks.log_class_probs), strict=True):
             np.testing.assert_allclose(probs, class_probs(history, features), rtol=1e-10)
 
 
@@ -98,7 +98,7 @@ def test_existence_and_class_of_each_label_are_those_of_the_enumeration(kind: An
                 expected[label] = expected.get(label, 0.0) + weight * class_probs(history, features)
         found = as_lmb(belief)
         assert [tuple(label) for label in found.tracks.labels.tolist()] == sorted(expected)
-        probs = np.exp(found.tracks.marks.log_class_probs) * found.existence[:, np.newaxis]
+        probs = np.exp(found.tracks.log_class_probs) * found.existence[:, np.newaxis]
         np.testing.assert_allclose(probs, [expected[label] for label in sorted(expected)], rtol=1e-9)
 
 
@@ -116,7 +116,7 @@ def test_features_alike_for_all_classes_are_one_ratio(kind: Any) -> None:
 
 
 def log_class_probs(belief: Any) -> Any:
-    return getattr(belief, "tracks", belief).marks.log_class_probs
+    return getattr(belief, "tracks", belief).log_class_probs
 
 
 @every_kind
@@ -162,10 +162,10 @@ def test_births_from_measurements_have_classes(kind: Any) -> None:
         rows = with_features(NEAR, features)
         births = births_from_scans(tracker.targets.birth, belief, [sensor], [rows], [np.zeros(3)], 2)
         assert births is not None
-        np.testing.assert_allclose(np.exp(births.tracks.marks.log_class_probs), [PROBS])
+        np.testing.assert_allclose(np.exp(births.tracks.log_class_probs), [PROBS])
         seen = ([rows], [np.zeros(3)]) if kind in CENTRAL else (rows, np.zeros(3))
         belief, _ = tracker.step(belief, *seen, 1.0, 2, rng=RNG, births=births)
-    probs = np.exp(as_lmb(belief).tracks.marks.log_class_probs)
+    probs = np.exp(as_lmb(belief).tracks.log_class_probs)
     expected = PROBS * np.exp(features[0])
     assert len(probs) == 1
     assert probs[0, 0] > PROBS[0]
@@ -199,7 +199,7 @@ def test_faults_are_named() -> None:
             np.zeros(1),
             np.zeros((1, 4)),
             np.eye(4)[np.newaxis],
-            Marks(np.log([[0.5, 0.4]]), np.empty((1, 0), np.int64)),
+            marks_of(np.log([[0.5, 0.4]])),
         )
     like = replace(birth(), class_probs=PROBS)
     assert [kind.empty(like).num_classes for kind in (LMB, GLMB, FactoredGLMB)] == [3, 3, 3]

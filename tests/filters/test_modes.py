@@ -89,9 +89,9 @@ def ordered(hypotheses: reference.Glmb) -> reference.Glmb:
 def mode_weights(belief: LabelledDensity) -> Floats:
     """Expected number of targets in each mode, and of those without one yet."""
     tracks = as_lmb(belief, max_components=10**6, merge_distance=0.0, log_min_weight=-math.inf)
-    modes = tracks.tracks.marks.modes
+    modes = tracks.tracks.modes
     existence = np.repeat(tracks.existence, np.diff(tracks.tracks.offsets)) * np.exp(tracks.tracks.log_weights)
-    return np.array([existence[modes[:, 0] == mode].sum() for mode in (-1, 0, 1)])
+    return np.array([existence[modes == mode].sum() for mode in (-1, 0, 1)])
 
 
 def enumerated_weights(hypotheses: reference.Glmb) -> Floats:
@@ -236,6 +236,6 @@ def test_one_target_is_an_interacting_multiple_model(kind):
         np.testing.assert_allclose(found[0], wanted[step][0], rtol=0, atol=1e-6)
         np.testing.assert_allclose(found[1], wanted[step][1], rtol=0, atol=1e-6)
         if step > 0:
-            assert sorted(own.marks.modes[:, 0]) == [0, 1, 2]
-            order = np.argsort(own.marks.modes[:, 0])
+            assert sorted(own.modes) == [0, 1, 2]
+            order = np.argsort(own.modes)
             np.testing.assert_allclose(weights[order], wanted[step][2], rtol=0, atol=1e-8)

@@ -12,7 +12,7 @@ from scipy.special import logsumexp
 
 from fusion.examples import A, B, by_label_set, full_glmbs, lmb
 from fusion.sights import views
-from vedette.densities import GLMB, LMB, FactoredGLMB, Marks, as_lmb
+from vedette.densities import GLMB, LMB, FactoredGLMB, as_lmb, marks_of
 from vedette.densities.tracks import merged_tracks
 from vedette.errors import InputError
 from vedette.fusion import ArithmeticAverage, Clmb, CmDeltaGlmb, ParallelUpdate
@@ -23,9 +23,7 @@ WEIGHTS = np.array([0.3, 0.7])
 
 def with_classes(belief: Any, rng: np.random.Generator, num_classes: int = 3) -> Any:
     probs = rng.dirichlet(np.ones(num_classes), len(belief.tracks.log_weights))
-    return replace(
-        belief, tracks=replace(belief.tracks, marks=Marks(np.log(probs), np.empty((len(probs), 0), np.int64)))
-    )
+    return replace(belief, tracks=replace(belief.tracks, marks=marks_of(np.log(probs))))
 
 
 def lmbs(seed: int, num: int = 2) -> tuple[list[LMB], list[LMB]]:
@@ -39,14 +37,14 @@ def assert_fused(fused: LMB, plain: LMB, log_products: Any) -> None:
     """log_products: (num_labels, num_classes) log of the product of the class probabilities."""
     factors = logsumexp(log_products, axis=1)
     np.testing.assert_allclose(fused.existence_logit, plain.existence_logit + factors, rtol=1e-9)
-    np.testing.assert_allclose(fused.tracks.marks.log_class_probs, log_products - factors[:, None], atol=1e-9)
+    np.testing.assert_allclose(fused.tracks.log_class_probs, log_products - factors[:, None], atol=1e-9)
     np.testing.assert_allclose(fused.tracks.means, plain.tracks.means)
 
 
 @pytest.mark.parametrize("seed", range(5))
 def test_covariance_intersection_of_lmbs(seed: int) -> None:
     plain, own = lmbs(seed)
-    products = np.tensordot(WEIGHTS, [belief.tracks.marks.log_class_probs for belief in own], 1)
+    products = np.tensordot(WEIGHTS, [belief.tracks.log_class_probs for belief in own], 1)
     assert_fused(Clmb(WEIGHTS).fuse(own)[0], Clmb(WEIGHTS).fuse(plain)[0], products)
 
 
@@ -73,7 +71,7 @@ def classes_of(belief: GLMB, labels: tuple[Any, ...]) -> Any:
     for first, last in pairwise(belief.hyp_offsets.tolist()):
         tracks = belief.hyp_tracks[first:last]
         if tuple(map(tuple, belief.tracks.labels[tracks].tolist())) == labels:
-            return belief.tracks.marks.log_class_probs[tracks]
+            return belief.tracks.log_class_probs[tracks]
     raise AssertionError
 
 
@@ -82,8 +80,8 @@ def test_arithmetic_average(seed: int) -> None:
     _, own = lmbs(seed)
     fused, _ = ArithmeticAverage(WEIGHTS).fuse(own)
     present = WEIGHTS[:, None] * [belief.existence for belief in own]
-    expected = (present[..., None] * np.exp([belief.tracks.marks.log_class_probs for belief in own])).sum(0)
-    found = np.exp(merged_tracks(fused.tracks).marks.log_class_probs)
+    expected = (present[..., None] * np.exp([belief.tracks.log_class_probs for belief in own])).sum(0)
+    found = np.exp(merged_tracks(fused.tracks).marks[:, 1:])
     np.testing.assert_allclose(found, expected / present.sum(0)[:, None], rtol=1e-9)
 
 
@@ -100,7 +98,7 @@ def test_parallel_update(of_kind: Any, seed: int) -> None:
     plain, own = lmbs(seed, 3)
     expected, _ = ParallelUpdate().fuse(list(map(of_kind, plain[1:])), predicted(of_kind(plain[0])))
     fused, _ = ParallelUpdate().fuse(list(map(of_kind, own[1:])), predicted(of_kind(own[0])))
-    logs = [belief.tracks.marks.log_class_probs for belief in own]
+    logs = [belief.tracks.log_class_probs for belief in own]
     assert_fused(as_lmb(fused), as_lmb(expected), logs[1] + logs[2] - logs[0])
 
 
@@ -112,18 +110,18 @@ def test_parallel_update_of_labels_in_one_factor(seed: int) -> None:
 
     def classified(belief: Any) -> Any:
         tiled = np.tile(probs, (len(belief.tracks.log_weights), 1))
-        return replace(belief, tracks=replace(belief.tracks, marks=Marks(tiled, np.empty((len(tiled), 0), np.int64))))
+        return replace(belief, tracks=replace(belief.tracks, marks=marks_of(tiled)))
 
     expected, _ = ParallelUpdate().fuse([joint, plain], predicted(plain))
     fused, _ = ParallelUpdate().fuse([classified(joint), classified(plain)], predicted(classified(plain)))
     np.testing.assert_allclose(as_lmb(fused).existence, as_lmb(expected).existence, rtol=1e-9)
-    np.testing.assert_allclose(as_lmb(fused).tracks.marks.log_class_probs, np.tile(probs, (2, 1)), atol=1e-9)
+    np.testing.assert_allclose(as_lmb(fused).tracks.log_class_probs, np.tile(probs, (2, 1)), atol=1e-9)
 
 
 def test_rebasing_applies_what_a_scan_said_of_the_class() -> None:
     plain, own = lmbs(1, 3)
     found, expected = rebase(own[0], own[1], own[2]), rebase(plain[0], plain[1], plain[2])
-    logs = [belief.tracks.marks.log_class_probs for belief in own]
+    logs = [belief.tracks.log_class_probs for belief in own]
     assert_fused(found, expected, logs[2] + logs[0] - logs[1])
 
 
@@ -138,21 +136,21 @@ def test_a_class_that_is_impossible_before_and_after_a_scan_stays_so() -> None:
     plain, own = lmbs(3, 3)
 
     def without_first(belief: LMB) -> LMB:
-        probs = np.exp(belief.tracks.marks.log_class_probs)
+        probs = np.exp(belief.tracks.log_class_probs)
         probs[:, 0] = 0.0
         with np.errstate(divide="ignore"):
             logs = np.log(probs / probs.sum(axis=1, keepdims=True))
-        return replace(belief, tracks=replace(belief.tracks, marks=Marks(logs, np.empty((len(logs), 0), np.int64))))
+        return replace(belief, tracks=replace(belief.tracks, marks=marks_of(logs)))
 
     own = [without_first(belief) for belief in own]
     fused = [as_lmb(ParallelUpdate().fuse(own[1:], predicted(own[0]))[0]), rebase(own[0], own[1], own[2])]
     expected = [as_lmb(ParallelUpdate().fuse(plain[1:], predicted(plain[0]))[0]), rebase(plain[0], plain[1], plain[2])]
-    logs = [belief.tracks.marks.log_class_probs[:, 1:] for belief in own]
+    logs = [belief.tracks.log_class_probs[:, 1:] for belief in own]
     for found, unclassified, log_products in zip(
         fused, expected, (logs[1] + logs[2] - logs[0], logs[2] + logs[0] - logs[1]), strict=True
     ):
         factors = logsumexp(log_products, axis=1)
-        logs_of_first, logs_of_others = np.split(found.tracks.marks.log_class_probs, [1], axis=1)
+        logs_of_first, logs_of_others = np.split(found.tracks.log_class_probs, [1], axis=1)
         assert (logs_of_first == -np.inf).all()
         np.testing.assert_allclose(logs_of_others, log_products - factors[:, None], atol=1e-9)
         np.testing.assert_allclose(found.existence_logit, unclassified.existence_logit + factors, rtol=1e-9)

@@ -12,7 +12,7 @@ from scipy.stats import multivariate_normal
 
 from fusion.examples import A, lmb
 from fusion.sights import views
-from vedette.densities import LMB, FactoredGLMB, Marks, load_density, map_estimate, save_density
+from vedette.densities import LMB, FactoredGLMB, load_density, map_estimate, marks_of, save_density
 from vedette.errors import InputError
 from vedette.fusion import ArithmeticAverage, Clmb, ParallelUpdate
 from vedette.fusion.rebasing import rebase
@@ -23,14 +23,14 @@ WEIGHTS = (0.3, 0.7)
 def with_modes(seed: int, modes: tuple[int, ...], dim: int = 2) -> LMB:
     """A belief of one label whose components have these modes."""
     rng, num = np.random.default_rng(seed), len(modes)
-    plain, column = lmb((A,), np.array([0.8]), rng), np.array(modes, np.int64)[:, np.newaxis]
+    plain = lmb((A,), np.array([0.8]), rng)
     tracks = replace(
         plain.tracks,
         offsets=np.array([0, num]),
         log_weights=np.log(rng.dirichlet(np.ones(num))),
         means=rng.normal(0.0, 1.0, (num, dim)),
         covs=np.array([np.diag(rng.uniform(0.5, 2.0, dim)) for _ in range(num)]),
-        marks=Marks(np.empty((num, 0)), column),
+        marks=marks_of(modes=np.array(modes)),
     )
     return LMB(tracks, plain.existence_logit)
 
@@ -38,7 +38,7 @@ def with_modes(seed: int, modes: tuple[int, ...], dim: int = 2) -> LMB:
 def density(belief: Any, mode: int, x: np.ndarray) -> np.ndarray:
     """Of the state and a mode at points (n, dim)."""
     tracks = belief.tracks
-    own = np.flatnonzero(tracks.marks.modes[:, 0] == mode)
+    own = np.flatnonzero(tracks.modes == mode)
     each = [np.exp(tracks.log_weights[c]) * multivariate_normal.pdf(x, tracks.means[c], tracks.covs[c]) for c in own]
     return np.sum(each, axis=0) if each else np.zeros(len(x))
 
@@ -54,12 +54,12 @@ def test_covariance_intersection_multiplies_mode_by_mode():
 
 def test_a_component_without_a_mode_goes_with_each():
     fused, _ = Clmb(WEIGHTS).fuse([with_modes(1, (-1,)), with_modes(2, (1, 0))])
-    assert sorted(fused.tracks.marks.modes[:, 0]) == [0, 1]
+    assert sorted(fused.tracks.modes) == [0, 1]
 
 
 def test_averages_keep_modes():
     fused, _ = ArithmeticAverage(WEIGHTS).fuse([with_modes(1, (0, 1)), with_modes(2, (1, 2))])
-    assert set(fused.tracks.marks.modes[:, 0]) == {0, 1, 2}
+    assert set(fused.tracks.modes) == {0, 1, 2}
 
 
 def test_what_forgets_modes_refuses_them():
@@ -78,7 +78,7 @@ def test_files_and_pickles_keep_modes(kind, tmp_path):
     save_density(tmp_path / "belief.npz", belief)
     found: list[Any] = [load_density(tmp_path / "belief.npz"), pickle.loads(pickle.dumps(belief))]
     for again in found:
-        np.testing.assert_array_equal(again.tracks.marks.modes, [[2], [0], [-1]])
+        np.testing.assert_array_equal(again.tracks.modes, [2, 0, -1])
 
 
 def test_an_estimate_is_the_mean_over_near_modes():
@@ -92,5 +92,5 @@ def test_an_estimate_is_the_mean_over_near_modes():
 
 def test_a_mode_below_the_first_is_refused():
     tracks = with_modes(1, (0, 1)).tracks
-    with pytest.raises(InputError, match=r"marks.modes: expected modes of at least -1; got -2"):
-        replace(tracks, marks=Marks(np.empty((2, 0)), np.array([[-2], [0]])))
+    with pytest.raises(InputError, match=r"modes: expected whole numbers of at least -1; got -2"):
+        replace(tracks, marks=marks_of(modes=np.array([-2, 0])))

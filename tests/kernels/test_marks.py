@@ -12,43 +12,22 @@ import vedette
 
 SRC = Path(vedette.__file__).parents[1]
 KERNELS = Path("vedette", "kernels")
-CLASSES_ALONE = "    if out.log_class_probs.shape[1] == 0:\n        return"
 MERGED = "    set_mode(out, target, _common_mode(marks, chosen, count))\n"
 POOLED = "    set_mode(out, target, mode)\n"
+FIRST = "    out[target, NUMBER] = marks[chosen[0], NUMBER]\n"
+COPIED = "    out[target, MODE] = marks[source, MODE]\n"
+SAME = "marks[first, MODE] == marks[second, MODE]"
 
 # The column `number`: components of different numbers are of different targets, and do not merge.
 EDITS = {
-    KERNELS / "base" / "types.py": [
-        (
-            "    log_class_probs: Floats  # (num,",
-            "    number: Floats  # (num, 1)\n    log_class_probs: Floats  # (num,",
-        ),
-    ],
+    KERNELS / "base" / "types.py": [("CLASSES = 1  #", "NUMBER = 1\nCLASSES = 2  #")],
     KERNELS / "gaussian" / "marks.py": [
-        ("Marks(np.empty((num, marks.", "Marks(np.empty((num, marks.number.shape[1])), np.empty((num, marks."),
-        ("Marks(np.empty((num, 0)),", "Marks(np.empty((num, 0)), np.empty((num, 0)),"),
-        ("Marks(np.empty((num, measurements", "Marks(np.empty((num, 0)), np.empty((num, measurements"),
-        ("Marks(marks.log_class_probs[first", "Marks(marks.number[first:last], marks.log_class_probs[first"),
-        (
-            "    set_mode(out, target, mode_of(marks, source))\n",
-            "    set_mode(out, target, mode_of(marks, source))\n{copy}",
-        ),
-        (
-            "    return mode_of(marks, first) ==",
-            "    if marks.number.shape[1] > 0 and marks.number[first, 0] != marks.number[second, 0]:\n"
-            "        return False\n    return mode_of(marks, first) ==",
-        ),
-        (MERGED, f"{{first}}{MERGED}"),
-        (POOLED, f"{{first}}{POOLED}"),
-        ("    classes, modes = zip(", "    numbers, classes, modes = zip("),
-        ("Marks(np.concatenate(classes)", "Marks(np.concatenate(numbers), np.concatenate(classes)"),
-        ("Marks(marks.log_class_probs[places]", "Marks(marks.number[places], marks.log_class_probs[places]"),
+        ("import CLASSES, MODE,", "import CLASSES, MODE, NUMBER,"),
+        (COPIED, f"{COPIED}    out[target, NUMBER] = marks[source, NUMBER]\n"),
+        (SAME, f"{SAME} and marks[first, NUMBER] == marks[second, NUMBER]"),
+        (MERGED, FIRST + MERGED),
+        (POOLED, FIRST + POOLED),
     ],
-}
-INSERTED = {
-    "{copy}": "    if marks.number.shape[1] > 0 and out.number.shape[1] > 0:\n"
-    "        out.number[target, 0] = marks.number[source, 0]\n",
-    "{first}": "    if out.number.shape[1] > 0:\n        out.number[target, 0] = marks.number[chosen[0], 0]\n",
 }
 
 AFTER = """
@@ -56,7 +35,7 @@ import pickle
 from dataclasses import replace
 import numpy as np
 from vedette import models
-from vedette.densities import LMB, FactoredGLMB, Marks, Poisson, as_glmb, as_lmb, load_density, save_density
+from vedette.densities import LMB, FactoredGLMB, Poisson, as_glmb, as_lmb, load_density, save_density
 from vedette.densities.tracks import single_gaussians
 from vedette.filters import DeltaGlmbFilter, FactoredGlmbFilter, Limits, LmbFilter, PhdFilter
 from vedette.fusion import ArithmeticAverage, Clmb, CmDeltaGlmb
@@ -64,7 +43,7 @@ from vedette.kernels.gaussian.components import components_of
 from vedette.kernels.gaussian.reduction import MixtureCaps, reduce_mixture
 
 def marked(numbers, classes):
-    return Marks(number=numbers, log_class_probs=classes, modes=np.empty((len(numbers), 0), np.int64))
+    return np.hstack([np.full((len(numbers), 1), -1.0), numbers, classes])
 
 region = models.Region(-100.0, 100.0, -100.0, 100.0)
 motion, survival = models.constant_velocity(1.0), models.constant_survival(0.99)
@@ -82,7 +61,7 @@ scan, rng = np.array([[-19.0, 1.0], [22.0, 0.0], [0.0, 50.0]]), np.random.defaul
 def check(belief):
     assert belief.tracks.num_tracks >= 2
     labels = np.repeat(belief.tracks.labels, np.diff(belief.tracks.offsets), axis=0)
-    np.testing.assert_array_equal(belief.tracks.marks.number[:, 0], labels[:, 1], type(belief).__name__)
+    np.testing.assert_array_equal(belief.tracks.marks[:, 1], labels[:, 1], type(belief).__name__)
 
 def step(kind, belief, limits=Limits()):
     return kind(targets, sensor, limits).step(belief, scan, np.zeros(3), 1.0, 5, rng=rng)[0]
@@ -105,7 +84,7 @@ for classes in (np.empty((4, 0)), np.log(np.full((4, 2), 0.5))):
     check(LMB(single_gaussians(own), lmb.existence_logit))
 intensity = Poisson(logs, means, covs, marks)
 found = step(PhdFilter, intensity)
-np.testing.assert_array_equal(found.marks.number[:, 0], np.where(found.means[:, 0] < 0.0, 1.0, 2.0))
+np.testing.assert_array_equal(found.marks[:, 1], np.where(found.means[:, 0] < 0.0, 1.0, 2.0))
 for rule in (Clmb([0.4, 0.6]), ArithmeticAverage([0.4, 0.6])):
     check(rule.fuse([lmb, step(LmbFilter, lmb)])[0])
 check(CmDeltaGlmb([0.4, 0.6]).fuse([as_sets(lmb), as_sets(step(LmbFilter, lmb))])[0])
@@ -121,8 +100,6 @@ def test_a_column_is_two_files(tmp_path: Path) -> None:
         text = (tmp_path / path).read_text("utf-8")
         for old, new in edits:
             assert old in text, old
-            for name, lines in INSERTED.items():
-                new = new.replace(name, lines)
             text = text.replace(old, new)
         (tmp_path / path).write_text(text, "utf-8")
     own = {**os.environ, "PYTHONPATH": str(tmp_path), "NUMBA_DISABLE_JIT": "1"}

@@ -33,7 +33,7 @@ from vedette.densities.statistics import cardinality_distribution, existence_pro
 from vedette.densities.tracks import TrackTable, mixture_moments, track_moments
 from vedette.densities.undetected import LearntRate, UndetectedIntensity, UndetectedTargets
 from vedette.densities.unlabelled import IidCluster, Poisson
-from vedette.kernels.base.types import Marks
+from vedette.kernels.gaussian.marks import marks_of
 
 __all__ = [
     "GLMB",
@@ -45,7 +45,6 @@ __all__ = [
     "IidCluster",
     "LabelledDensity",
     "LearntRate",
-    "Marks",
     "MultiBernoulli",
     "MultiTargetSamples",
     "Poisson",
@@ -67,6 +66,7 @@ __all__ = [
     "map_or_unlabelled",
     "marginal_estimate",
     "marginalise",
+    "marks_of",
     "mixture_moments",
     "resolve_labels",
     "sample_glmb",

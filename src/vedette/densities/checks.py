@@ -15,8 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vedette.errors import InputError, NumericalError, VedetteError
-from vedette.kernels.base.types import Bools, Floats, Ints, Marks
-from vedette.kernels.gaussian.marks import NOT_DRAWN, unmarked
+from vedette.kernels.base.types import CLASSES, MODE, Bools, Floats, Ints
+from vedette.kernels.gaussian.marks import NOT_DRAWN
 from vedette.models.arguments import as_array
 
 NORMALISATION_TOLERANCE = 1e-9
@@ -180,15 +180,15 @@ def check_components(field: str, density: Any, error: type[VedetteError] = Numer
     check_log_weights(f"{field}log_weights", log_weights, error)
     check_finite(f"{field}means", means, error)
     check_covariances(f"{field}covs", covs, error)
-    if not isinstance(marks, Marks):
-        raise InputError(f"{field}marks: expected Marks; got {type(marks).__name__}")
-    for name, column, none in zip(Marks._fields, marks, unmarked(), strict=True):
-        check_array(f"{field}marks.{name}", column, none.dtype.type, (num_components, None))
-    if (marks.modes < NOT_DRAWN).any():
-        raise error(f"{field}marks.modes: expected modes of at least {NOT_DRAWN}; got {marks.modes.min()}")
-    classes = marks.log_class_probs
+    check_array(f"{field}marks", marks, np.float64, (num_components, None))
+    if marks.shape[1] < CLASSES:
+        raise InputError(f"{field}marks: expected at least {CLASSES} column; got {marks.shape[1]}")
+    modes, classes = marks[:, MODE], marks[:, CLASSES:]
+    if not ((modes >= NOT_DRAWN) & (modes == np.floor(modes))).all():
+        wrong = modes[~((modes >= NOT_DRAWN) & (modes == np.floor(modes)))][0]
+        raise error(f"{field}modes: expected whole numbers of at least {NOT_DRAWN}; got {wrong:g}")
     if classes.size:
-        name, flat = f"{field}marks.log_class_probs", classes.reshape(-1)
+        name, flat = f"{field}log_class_probs", classes.reshape(-1)
         check_log_weights(name, flat, error)
         check_normalised(name, flat, np.arange(num_components + 1) * classes.shape[1], error)
 

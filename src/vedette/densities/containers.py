@@ -9,7 +9,7 @@ from __future__ import annotations
 from abc import abstractmethod
 from collections.abc import Callable
 from operator import attrgetter
-from typing import Any, ClassVar, Self, TypeVar, cast
+from typing import Any, ClassVar, Self, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,9 +17,9 @@ from numpy.typing import NDArray
 from vedette.densities.inspection import Targets
 from vedette.errors import InputError, NumericalError, VedetteError
 from vedette.internal.representation import SummaryRepr, TabularRepr
-from vedette.kernels.base.types import Floats, Marks, Mixture
+from vedette.kernels.base.types import CLASSES, MODE, Floats, Ints, Marks, Mixture
 from vedette.kernels.gaussian.components import components_of
-from vedette.kernels.gaussian.marks import taken_marks, unmarked
+from vedette.kernels.gaussian.marks import NOT_DRAWN, unmarked
 from vedette.models.arguments import no_gaussians
 
 _Made = TypeVar("_Made", bound=SummaryRepr)
@@ -37,11 +37,9 @@ class Container(SummaryRepr):
     def _own_arrays(self) -> None:
         """Replace the given arrays by copies. A public constructor calls this before its checks."""
         for name in self.__match_args__:  # type: ignore[attr-defined]
-            object.__setattr__(self, name, self._owned(getattr(self, name)))
-
-    def _owned(self, value: Any) -> Any:
-        """Return a read-only copy of an array or of the columns of marks, and anything else as it is."""
-        return _held(np.array(value, order="C")) if type(value) is np.ndarray else value
+            value = getattr(self, name)
+            if type(value) is np.ndarray:
+                object.__setattr__(self, name, _held(np.array(value, order="C")))
 
     def with_fields(self, **changed: Any) -> Self:
         """Return a copy with other values of some fields, without checks. See `unchecked`."""
@@ -65,20 +63,14 @@ class Components(Container):
     marks: Marks
 
     def __post_init__(self) -> None:
+        if np.shape(self.marks) == (0, CLASSES):  # the default
+            object.__setattr__(self, "marks", unmarked(len(self.log_weights)))
         self._own_arrays()
         self.validate(error=InputError)
 
     @abstractmethod
     def validate(self, *, error: type[VedetteError] = NumericalError) -> None:
         """Raise unless the arrays are consistent and form a density."""
-
-    def _owned(self, value: Any) -> Any:
-        """Likewise. A column of marks without width gets a row for each component."""
-        if type(value) is not Marks:
-            return super()._owned(value)
-        num = len(self.log_weights)
-        rows = (column.reshape(num, 0) if np.shape(column)[1:] == (0,) else column for column in value)
-        return Marks(*map(self._owned, rows))
 
     @property
     def state_dim(self) -> int:
@@ -88,12 +80,26 @@ class Components(Container):
     @property
     def num_classes(self) -> int:
         """Number of classes of targets, or 0 if they have none."""
-        return int(self.marks.log_class_probs.shape[1])
+        return int(self.marks.shape[1]) - CLASSES
+
+    @property
+    def log_class_probs(self) -> Floats:
+        """Log probabilities of the classes of each component, (num_components, num_classes)."""
+        return self.marks[:, CLASSES:]
+
+    @property
+    def has_modes(self) -> bool:
+        """True if the mode of a component is known."""
+        return bool((self.marks[:, MODE] > NOT_DRAWN).any())
+
+    @property
+    def modes(self) -> Ints:
+        """Mode of motion of each component, (num_components,), -1 before it is drawn at the first prediction."""
+        return self.marks[:, MODE].astype(np.int64)
 
     def _components(self) -> Mixture:
         """Return the components as a kernel bundle."""
-        found = _COMPONENTS(self)
-        return Mixture(found[0], found[1], found[2], Marks._make(found[3:]))  # faster than by star
+        return Mixture._make(_COMPONENTS(self))
 
 
 class MultiTarget(Container, TabularRepr):
@@ -141,7 +147,7 @@ def unchecked(container: type[_Made], *fields: Any) -> _Made:
         if type(value) is array and type(value.base) is not array and value.flags.carray:
             value = value.view()  # the common case, without a call of _held
             value.setflags(False)  # type: ignore[call-arg]  # three times as fast as by keyword
-        elif type(value) is array or type(value) is Marks:
+        elif type(value) is array:
             value = _held(value)
         put(made, name, value)
     return made
@@ -157,30 +163,25 @@ def kernel_arrays(*fields: str) -> Callable[[Container], tuple[Any, ...]]:
     return attrgetter(*(f"{field}.base" for field in fields))
 
 
-COMPONENTS = ("log_weights", "means", "covs", *(f"marks.{name}" for name in Marks._fields))
-_COMPONENTS = kernel_arrays(*COMPONENTS)
+_COMPONENTS = kernel_arrays(*Mixture._fields)
 
 
 def no_components(like: Any) -> Mixture:
     """Return no components, with the states and marks of a container or a birth model, or of a state dimension."""
     dim, marks = (like.state_dim, like.marks) if hasattr(like, "marks") else (like, unmarked())
-    return components_of(np.empty(0), *no_gaussians(dim), taken_marks(marks, slice(0)))
+    return components_of(np.empty(0), *no_gaussians(dim), marks[:0])
 
 
 def _held(value: Any) -> Any:
-    """Return an array as a read-only field, without a copy if possible, also in marks, and anything else as it is."""
-    if type(value) is not np.ndarray and type(value) is not Marks:
+    """Return an array as a read-only field, without a copy if possible, and anything else as it is."""
+    if type(value) is not np.ndarray:
         return value
-    held, arrays = list[Any](), cast(tuple[Any, ...], value if type(value) is Marks else (value,))
-    for array in arrays:
-        base, flags = array.base, array.flags
-        if type(base) is not np.ndarray:
-            view = array.view() if flags.carray else np.array(array, order="C").view()
-        elif not flags.writeable and array.size == base.size and array.strides == base.strides:
-            held.append(array)
-            continue
-        else:  # a part of another array, whose base has another shape
-            view = np.array(array, order="C").view()
-        view.setflags(False)  # type: ignore[call-arg]  # three times as fast as by keyword or attribute
-        held.append(view)
-    return Marks(*held) if type(value) is Marks else held[0]
+    base, flags = value.base, value.flags
+    if type(base) is not np.ndarray:
+        view = value.view() if flags.carray else np.array(value, order="C").view()
+    elif not flags.writeable and value.size == base.size and value.strides == base.strides:
+        return value
+    else:  # a part of another array, whose base has another shape
+        view = np.array(value, order="C").view()
+    view.setflags(False)  # type: ignore[call-arg]  # three times as fast as by keyword or attribute
+    return view

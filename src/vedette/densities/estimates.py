@@ -32,9 +32,8 @@ from vedette.densities.unlabelled import IidCluster, Poisson
 from vedette.errors import InputError, NumericalError, VedetteError
 from vedette.internal.representation import TabularRepr
 from vedette.internal.text import pluralise
-from vedette.kernels.base.types import Floats, Ints, Tracks
+from vedette.kernels.base.types import CLASSES, Floats, Ints, Tracks
 from vedette.kernels.gaussian.components import taken_components, without_modes
-from vedette.kernels.gaussian.marks import unmarked
 from vedette.kernels.gaussian.pooling import reduced_tracks
 from vedette.kernels.gaussian.position_integrals import spread_nodes
 from vedette.kernels.gaussian.reduction import reduce_mixture
@@ -246,7 +245,7 @@ def _peaks(tracks: TrackTable, chosen: Ints, existence: Floats) -> Estimate:
     heaviest = heaviest_components(own.log_weights, own.offsets, chosen)
     classes = checks.no_classes()
     if tracks.num_classes:
-        classes = np.exp(merged_tracks(take_tracks(tracks, chosen)).marks.log_class_probs)
+        classes = np.exp(merged_tracks(take_tracks(tracks, chosen)).marks[:, CLASSES:])
     modes = mode_probabilities(tracks)[chosen]
     return Estimate(own.labels[chosen], own.means[heaviest], own.covs[heaviest], existence, classes, modes)
 
@@ -276,7 +275,7 @@ def unlabelled_estimate(density: Poisson | IidCluster | MultiBernoulli, step: in
     lighter than 0.2. There are fewer components than targets if all targets are at one position. Existence is the
     remaining weight of the component, at most 1. Ties: the smaller number, then the earlier Bernoulli or component.
     """
-    if getattr(density, "marks", unmarked()).modes.shape[1] > 0:
+    if getattr(density, "has_modes", False):
         density = _without_modes(density)
     if isinstance(density, MultiBernoulli):
         number = int(np.argmax(cardinality_distribution(density)))
@@ -291,7 +290,7 @@ def unlabelled_estimate(density: Poisson | IidCluster | MultiBernoulli, step: in
     else:
         raise InputError(f"density: expected one without labels; got {type(density).__name__}")
     labels = np.column_stack([np.full(len(components), step), np.arange(len(components))]).astype(np.int64)
-    classes = np.exp(density.marks.log_class_probs[components])
+    classes = np.exp(density.log_class_probs[components])
     return Estimate(labels, density.means[components], density.covs[components], existence, classes)
 
 

@@ -21,8 +21,6 @@ from vedette.errors import InputError, VedetteError
 from vedette.internal.files import write_file
 from vedette.internal.reading import error_summary, read_arrays, read_file, unreadable
 from vedette.internal.text import shown
-from vedette.kernels.base.types import Marks
-from vedette.kernels.gaussian.marks import unmarked
 from vedette.models import CellGrid, Region
 
 FORMAT_NAME = "vedette-density"
@@ -89,14 +87,12 @@ def _kind_of(source: Path, arrays: Mapping[str, Any]) -> str:
 
 
 def _arrays(container: Any, prefix: str = "") -> dict[str, Any]:
-    """Return the arrays of a container by their names in a file, without sources and marks that there are not."""
+    """Return the arrays of a container by their names in a file, without sources that there are not."""
     arrays: dict[str, Any] = {}
     for field in fields(container):
         name, value = f"{prefix}{field.name}", getattr(container, field.name)
         if field.name == "tracks":
             arrays |= _arrays(value, "tracks.")
-        elif field.name == "marks":
-            arrays |= {f"{name}.{own}": array for own, array in value._asdict().items() if array.shape[1] > 0}
         elif isinstance(value, UndetectedTargets):
             arrays |= _arrays_of_undetected(value)
         elif value is not None:
@@ -110,9 +106,6 @@ def _fields(container: type[Any], arrays: Mapping[str, Any], prefix: str = "") -
     for name in (field.name for field in fields(container)):
         if name == "tracks":
             own[name] = TrackTable(**_fields(TrackTable, arrays, "tracks."))
-        elif name == "marks":
-            marks = unmarked()._asdict().items()
-            own[name] = Marks(*(arrays.get(f"{prefix}marks.{column}", none) for column, none in marks))
         elif name == "undetected":
             own[name] = _undetected_of(arrays) if f"{_UNDETECTED}.next_label" in arrays else None
         else:

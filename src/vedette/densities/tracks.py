@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from vedette.densities import checks
-from vedette.densities.containers import COMPONENTS, Components, for_kernel, kernel_arrays, no_components, unchecked
+from vedette.densities.containers import Components, for_kernel, kernel_arrays, no_components, unchecked
 from vedette.errors import InputError, NumericalError, VedetteError
 from vedette.internal.text import pluralise
 from vedette.kernels.base import types as kt
@@ -24,7 +24,7 @@ from vedette.kernels.gaussian.reduction import MixtureCaps
 
 UNSCANNED = -2  # replaces a measurement index
 OF_ANY_MODE = MixtureCaps(-math.inf, 2.0, 2**62)  # for components of different modes
-_ARRAYS = kernel_arrays("labels", "offsets", *COMPONENTS)
+_ARRAYS = kernel_arrays("labels", "offsets", *kt.Mixture._fields)
 
 
 @dataclass(frozen=True, slots=True, repr=False)
@@ -72,8 +72,8 @@ class TrackTable(Components):
 
     def to_kernel(self) -> kt.Tracks:
         """Return the arrays as a kernel bundle."""
-        labels, offsets, log_weights, means, covs, *marks = _ARRAYS(self)
-        return kt.Tracks(labels, offsets, kt.Mixture(log_weights, means, covs, kt.Marks._make(marks)))
+        labels, offsets, log_weights, means, covs, marks = _ARRAYS(self)
+        return kt.Tracks(labels, offsets, kt.Mixture(log_weights, means, covs, marks))
 
     @classmethod
     def from_kernel(cls, tracks: kt.Tracks, sources: Ints | None = None) -> TrackTable:
@@ -208,7 +208,7 @@ def mixture_moments(log_weights: Floats, means: Floats, covs: Floats) -> tuple[F
 
 def over_modes(tracks: TrackTable) -> TrackTable:
     """Return the tracks without modes, so that near components of different ones are one."""
-    if tracks.marks.modes.shape[1] == 0:
+    if not tracks.has_modes:
         return tracks
     given = tracks.to_kernel()
     plain = without_modes(given.components)
@@ -217,9 +217,7 @@ def over_modes(tracks: TrackTable) -> TrackTable:
 
 def mode_probabilities(tracks: TrackTable) -> Floats:
     """Return the probability of each mode of each track, (num_tracks, number of modes that occur)."""
-    if tracks.marks.modes.shape[1] == 0:
-        return np.empty((tracks.num_tracks, 0))
-    modes = tracks.marks.modes.reshape(-1)
+    modes = tracks.modes
     table = np.zeros((tracks.num_tracks, modes.max(initial=NOT_DRAWN) + 1))
     owner, drawn = np.repeat(np.arange(tracks.num_tracks), np.diff(tracks.offsets)), np.flatnonzero(modes != NOT_DRAWN)
     if len(drawn):

@@ -19,7 +19,6 @@ from vedette.densities.tracks import gaussian_tracks, relabelled_tracks
 from vedette.errors import InputError, ModelError, VedetteError
 from vedette.internal.unit_warnings import warn_implausible
 from vedette.kernels.base.types import Floats, Ints, Lmb, Measurements
-from vedette.kernels.gaussian.marks import taken_marks
 from vedette.kernels.gaussian.scans import examined_scan
 from vedette.kernels.labelled import births as kernels
 from vedette.models import BirthModel, SensorModel, TargetModel
@@ -184,8 +183,7 @@ def births_within(born: LMB, period: float | None, dt: float, others: LMB | None
 def births_of(birth: BirthModel) -> LMB:
     """Return the births at the sites, labelled with step 0, cached for each model."""
     labels = np.column_stack([np.zeros(birth.num_sites, np.int64), np.arange(birth.num_sites)])
-    marks = taken_marks(birth.marks, np.zeros(birth.num_sites, np.int64))
-    tracks = gaussian_tracks(labels, birth.means, birth.covs, marks)
+    tracks = gaussian_tracks(labels, birth.means, birth.covs, np.tile(birth.marks, (birth.num_sites, 1)))
     return unchecked(LMB, tracks, np.log(birth.existence) - np.log1p(-birth.existence))
 
 

@@ -14,15 +14,13 @@ from vedette.errors import InputError
 from vedette.fusion.views import FieldsOfView
 from vedette.internal.text import join_alternatives
 from vedette.kernels.base.types import Bools, Floats, Ints
-from vedette.kernels.gaussian.marks import unmarked
 from vedette.kernels.labelled.set_fusion import LOST, SURE
 from vedette.kernels.labelled.validity import is_valid_lmb
 from vedette.models.arguments import real, reject, sequence
 
 # Data type and number of dimensions of the arrays of an LMB: labels, offsets, columns of the components, logits.
 _INT, _FLOAT = np.dtype(np.int64), np.dtype(np.float64)
-_MIXTURE = (_FLOAT, 1), (_FLOAT, 2), (_FLOAT, 3), *((column.dtype, 2) for column in unmarked())
-_FORMS = (_INT, 2), (_INT, 1), (_FLOAT, 1), *_MIXTURE
+_FORMS = (_INT, 2), (_INT, 1), (_FLOAT, 1), (_FLOAT, 1), (_FLOAT, 2), (_FLOAT, 3), (_FLOAT, 2)
 
 
 @dataclass(frozen=True, slots=True)
@@ -156,12 +154,12 @@ def _has_kernel_arrays(belief: Any) -> bool:
     for array, (dtype, ndim) in zip(arrays, _FORMS, strict=True):
         if type(array) is not np.ndarray or array.dtype != dtype or array.ndim != ndim:
             return False
-    return all(len(column) == len(tracks.log_weights) for column in tracks.marks)
+    return len(tracks.marks) == len(tracks.log_weights)
 
 
 def refuse_modes(what: str, beliefs: Sequence[LabelledDensity]) -> None:
     """Raise `InputError` if targets have modes of motion, which a fusion with one Gaussian for each label forgets."""
-    if any(belief.tracks.marks.modes.shape[1] > 0 for belief in beliefs):
+    if any(belief.tracks.has_modes for belief in beliefs):
         wanted = "a motion without modes, or sequential, central, GCI or average fusion"
         raise InputError(f"{what}: expected {wanted}; got tracks with modes of motion")
 

@@ -38,8 +38,9 @@ from vedette.fusion.parallel_sets import (
 from vedette.fusion.powers import ONE, FusionLimits, check_limits
 from vedette.fusion.views import FieldsOfView
 from vedette.internal.probabilities import expit, log_expit
-from vedette.kernels.base.types import Floats, Ints, Mixture, Tracks
+from vedette.kernels.base.types import CLASSES, Floats, Ints, Mixture, Tracks
 from vedette.kernels.gaussian.components import taken_components
+from vedette.kernels.gaussian.marks import marks_of
 from vedette.kernels.gaussian.pooling import merged_mixtures
 from vedette.kernels.labelled.parallel import update_in_parallel
 from vedette.kernels.labelled.stacking import stack_tracks
@@ -207,13 +208,13 @@ class ParallelUpdate:
         except FloatingPointError as fault:
             raise NumericalError(f"fusion of tracks: {fault}") from None
         fused = prior._replace(log_weights=np.zeros(len(means)), means=means, covs=covs)
-        classes = prior.marks.log_class_probs
+        classes = prior.marks[:, CLASSES:]
         if classes.shape[1] == 0:
             return fused, log_overlaps
-        own = merged_mixtures(tracks.components, tracks.offsets).marks.log_class_probs
+        own = merged_mixtures(tracks.components, tracks.offsets).marks[:, CLASSES:]
         gains = np.where((chosen >= 0)[..., np.newaxis], class_gains(own[chosen], classes[:, np.newaxis]), 0.0)
         classes, log_factors = updated_classes(classes, (weights[:, np.newaxis] * gains).sum(axis=1))
-        return fused._replace(marks=prior.marks._replace(log_class_probs=classes)), log_overlaps + log_factors
+        return fused._replace(marks=marks_of(classes)), log_overlaps + log_factors
 
 
 def _prediction_of(views: FieldsOfView | None, *, check: bool) -> LabelledDensity:

@@ -9,7 +9,7 @@ from vedette.densities.containers import unchecked
 from vedette.densities.tracks import gaussian_tracks, merged_tracks, place_labels, take_tracks
 from vedette.fusion.base import refuse_modes
 from vedette.fusion.classes import class_gains, updated_classes
-from vedette.kernels.base.types import Floats
+from vedette.kernels.base.types import CLASSES, Floats
 from vedette.kernels.labelled.stacking import stack_tracks
 
 
@@ -49,8 +49,8 @@ def rebase(posterior: LMB, own: LMB, prediction: LMB) -> LMB:
     known_moments, said_moments = (old.means[before], old.covs[before]), (new.means[after], new.covs[after])
     means[at], covs[at], gained = _updated((means[at], covs[at]), known_moments, said_moments)
     said, known = posterior.existence_logit[after], own.existence_logit[before]
-    gains = class_gains(new.marks.log_class_probs[after], old.marks.log_class_probs[before])
-    marks.log_class_probs[at], log_factors = updated_classes(marks.log_class_probs[at], gains)
+    gains = class_gains(new.marks[after, CLASSES:], old.marks[before, CLASSES:])
+    marks[at, CLASSES:], log_factors = updated_classes(marks[at, CLASSES:], gains)
     with np.errstate(invalid="ignore"):  # an impossible or certain label that stays so carries no information
         logits[at] += np.where(said == known, 0.0, said - known) + gained + log_factors
     return unchecked(LMB, gaussian_tracks(prediction.tracks.labels, means, covs, marks), logits)

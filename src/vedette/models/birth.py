@@ -9,7 +9,7 @@ from typing import Literal
 import numpy as np
 
 from vedette.kernels.base.types import VX, VY, Floats, Marks
-from vedette.kernels.gaussian.marks import unmarked
+from vedette.kernels.gaussian.marks import marks_of, unmarked
 from vedette.models.arguments import float_array, instance, no_gaussians, positive, positive_definite, reject
 from vedette.models.fields import Chance, check_fields
 from vedette.models.grid import CellGrid
@@ -156,8 +156,7 @@ class BirthModel:
     @property
     def marks(self) -> Marks:
         """Marks of the component of a birth."""
-        none = unmarked(1)
-        return none if self.class_probs is None else none._replace(log_class_probs=np.log([self.class_probs]))
+        return unmarked(1) if self.class_probs is None else marks_of(np.log([self.class_probs]))
 
     def is_active(self, step: int) -> bool:
         """Return True if targets may be born at the sites at this filter step."""

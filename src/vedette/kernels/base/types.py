@@ -15,6 +15,12 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 Bools = NDArray[np.bool_]
 
+# Marks of Gaussian components, (num, 1 + num_classes). All functions that depend on the columns are in
+# `vedette.kernels.gaussian.marks`, so that a new column is added only here and there.
+Marks = Floats
+MODE = 0  # mode of motion, or -1: not drawn yet, as at birth
+CLASSES = 1  # first of the log probabilities of the classes of a target
+
 # States begin with the position, those of four components or more also with the velocity. Others are found by name.
 VX, VY = 2, 3
 VELOCITY = slice(VX, VY + 1)  # m/s
@@ -49,17 +55,6 @@ def common_components(states: Iterable[Sequence[str]]) -> tuple[str, ...]:
     """Return the components that at least one kind of state has: position and velocity first, then others in order."""
     found = dict.fromkeys(name for components in states for name in components)
     return (*(name for name in PLANE if name in found), *(name for name in found if name not in PLANE))
-
-
-class Marks(NamedTuple):
-    """Optional columns of Gaussian components. A column that is not in use has no width.
-
-    All functions that depend on the columns are in `vedette.kernels.gaussian.marks`, so that a new column is added only
-    here and there.
-    """
-
-    log_class_probs: Floats  # (num, num_classes) log probability of each class of target
-    modes: Ints  # (num, 1) mode of motion, or -1: not drawn yet, as at birth. (num, 0): not drawn yet anywhere
 
 
 class Mixture(NamedTuple):

@@ -10,17 +10,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from vedette.kernels.base.compile import borrowing, inlined, kernel
-from vedette.kernels.base.types import Floats, Ints, Marks, Mixture
-from vedette.kernels.gaussian.marks import (
-    copy_marks,
-    joined_marks,
-    marks_between,
-    marks_like,
-    marks_like_both,
-    merge_marks,
-    taken_marks,
-    unmarked,
-)
+from vedette.kernels.base.types import MODE, Floats, Ints, Marks, Mixture
+from vedette.kernels.gaussian.marks import NOT_DRAWN, copy_marks, marks_like, merge_marks, unmarked
 from vedette.kernels.gaussian.mixtures import choose_all, match_components
 
 
@@ -48,7 +39,7 @@ def copy_gaussian(means: Floats, covs: Floats, source: int, out_means: Floats, o
 
 @inlined
 def copy_component(mixture: Mixture, source: int, out: Mixture, target: int) -> None:
-    """Copy component `source` to place `target`, without the marks for which `out` has no column."""
+    """Copy component `source` to place `target`, in the columns of marks that `out` has."""
     out.log_weights[target] = mixture.log_weights[source]
     copy_gaussian(mixture.means, mixture.covs, source, out.means, out.covs, target)
     copy_marks(mixture.marks, source, out.marks, target)
@@ -65,8 +56,8 @@ def copy_components(mixture: Mixture, first: int, last: int, out: Mixture, start
 @kernel
 def components_between(mixture: Mixture, first: int, last: int) -> Mixture:
     """Components `first:last`, as views."""
-    marks = marks_between(mixture.marks, first, last)
-    return Mixture(mixture.log_weights[first:last], mixture.means[first:last], mixture.covs[first:last], marks)
+    log_weights, means, covs, marks = mixture
+    return Mixture(log_weights[first:last], means[first:last], covs[first:last], marks[first:last])
 
 
 @inlined
@@ -78,10 +69,8 @@ def borrowed_components(mixture: Mixture, num: int) -> Mixture:
 @kernel
 def own_components(mixture: Mixture, num: int) -> Mixture:
     """The first `num` components in arrays of their own."""
-    marks = marks_like(mixture.marks, num)
-    for c in range(num):
-        copy_marks(mixture.marks, c, marks, c)
-    return Mixture(mixture.log_weights[:num].copy(), mixture.means[:num].copy(), mixture.covs[:num].copy(), marks)
+    log_weights, means, covs, marks = mixture
+    return Mixture(log_weights[:num].copy(), means[:num].copy(), covs[:num].copy(), marks[:num].copy())
 
 
 @kernel
@@ -99,8 +88,7 @@ def grown_components(mixture: Mixture, filled: int, needed: int) -> Mixture:
 def stacked_mixtures(first: Mixture, second: Mixture) -> Mixture:
     """The components of both, in their order."""
     num, more = len(first.log_weights), len(second.log_weights)
-    n, marks = first.means.shape[1], marks_like_both(first.marks, second.marks, num + more)
-    out = Mixture(np.empty(num + more), np.empty((num + more, n)), np.empty((num + more, n, n)), marks)
+    out = components_like(first, num + more)
     copy_components(first, 0, num, out, 0)
     copy_components(second, 0, more, out, num)
     return out
@@ -130,22 +118,22 @@ def merge_all(
 
 
 def components_of(log_weights: Floats, means: Floats, covs: Floats, marks: Marks | None = None) -> Mixture:
-    """New components of these weights, moments and marks. None: no column in use."""
+    """New components of these weights, moments and marks. None: neither modes nor classes."""
     return Mixture(log_weights, means, covs, unmarked(len(log_weights)) if marks is None else marks)
 
 
 def without_modes(mixture: Mixture) -> Mixture:
-    """The components without the column of modes."""
-    return mixture._replace(marks=mixture.marks._replace(modes=unmarked(len(mixture.log_weights)).modes))
+    """The components without their modes."""
+    marks = mixture.marks.copy()
+    marks[:, MODE] = NOT_DRAWN
+    return mixture._replace(marks=marks)
 
 
 def taken_components(mixture: Mixture, places: Ints | slice) -> Mixture:
     """The components at `places`, in that order."""
-    log_weights, means, covs = (column[places] for column in mixture[:3])
-    return Mixture(log_weights, means, covs, taken_marks(mixture.marks, places))
+    return Mixture(*(column[places] for column in mixture))
 
 
 def joined_components(mixtures: Sequence[Mixture]) -> Mixture:
     """The components of all mixtures, in their order."""
-    log_weights, means, covs, marks = zip(*mixtures, strict=True)
-    return Mixture(np.concatenate(log_weights), np.concatenate(means), np.concatenate(covs), joined_marks(marks))
+    return Mixture(*map(np.concatenate, zip(*mixtures, strict=True)))

@@ -1,113 +1,93 @@
-"""Marks of Gaussian components: their optional columns made, copied, merged, pooled, updated and joined.
+"""Marks of Gaussian components: made, copied, merged, pooled and updated.
 
-All other code treats the marks of components as one bundle.
+All other code treats the marks of components as rows of one array. Its columns are the mode of motion and the log
+probability of each class of target.
 
 The class of a target does not change, and neither its motion nor its detection depends on it. A component is then a
 product of a Gaussian and class probabilities, and a measurement with likelihood ratio r(k) of its features for class k
 (over those of a false measurement) gives it the factor sum of r(k) p(k), and the probabilities r(k) p(k) over that sum.
 
 The mode of a component is drawn at its first prediction (`vedette.kernels.gaussian.modes`). Until then it is
-distributed as at birth, which is what a component without the column says too.
+distributed as at birth.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
 
 import numpy as np
 
 from vedette.kernels.base.compile import borrowing, inlined, kernel
-from vedette.kernels.base.types import Floats, Ints, Marks, Measurements
+from vedette.kernels.base.types import CLASSES, MODE, Floats, Ints, Marks, Measurements
 from vedette.kernels.gaussian.linalg import normalise_logs
 
 NOT_DRAWN = -1  # as a mode
 
 
+def unmarked(num: int = 0) -> Marks:
+    """Marks of this number of components, without modes and classes."""
+    return np.full((num, CLASSES), float(NOT_DRAWN))
+
+
+no_marks = kernel(unmarked)  # for kernels
+
+
 @kernel
 def marks_like(marks: Marks, num: int) -> Marks:
     """Room for this number of components, with the columns of `marks`."""
-    return Marks(np.empty((num, marks.log_class_probs.shape[1])), np.empty((num, marks.modes.shape[1]), np.int64))
-
-
-@kernel
-def marks_like_both(first: Marks, second: Marks, num: int) -> Marks:
-    """Room for this number of components, with the columns that either has."""
-    return marks_with_modes(first, num) if have_modes(second) else marks_like(first, num)
-
-
-@kernel
-def marks_with_modes(marks: Marks, num: int) -> Marks:
-    """Room for this number of components, with the columns of `marks` and that of modes."""
-    return Marks(np.empty((num, marks.log_class_probs.shape[1])), np.empty((num, 1), np.int64))
+    return np.empty((num, marks.shape[1]))
 
 
 @kernel
 def room_for_updated_marks(measurements: Measurements, num: int) -> Marks:
     """Room for this number of components, with the columns that measurements change."""
-    return Marks(np.empty((num, measurements.class_ratios.shape[1])), np.empty((num, 0), np.int64))
-
-
-@kernel
-def marks_between(marks: Marks, first: int, last: int) -> Marks:
-    """Marks of components `first:last`, as views."""
-    return Marks(marks.log_class_probs[first:last], marks.modes[first:last])
+    return np.empty((num, CLASSES + measurements.class_ratios.shape[1]))
 
 
 @inlined
 def mode_of(marks: Marks, c: int) -> int:
     """Return the mode of component `c`, or `NOT_DRAWN`."""
-    return marks.modes[c, 0] if marks.modes.shape[1] > 0 else NOT_DRAWN
+    return int(marks[c, MODE])
 
 
 @inlined
 def set_mode(marks: Marks, c: int, mode: int) -> None:
-    """Write the mode of component `c`, if the marks have the column."""
-    if marks.modes.shape[1] > 0:
-        marks.modes[c, 0] = mode
+    """Write the mode of component `c`."""
+    marks[c, MODE] = mode
 
 
 @inlined
 def has_room(marks: Marks, order: Ints, k: int, most: int) -> bool:
-    """Return True if the component at `order[k]` is among the first `most` of its mode in that order."""
-    before = k
-    if have_modes(marks):
+    """Return True if the component at `order[k]` is among the first `most` of its mode in that order.
+
+    Without a mode it must be among the first of all.
+    """
+    mode, before = mode_of(marks, order[k]), k
+    if mode != NOT_DRAWN:
         before = 0
         for i in range(k):
-            before += mode_of(marks, order[i]) == mode_of(marks, order[k])
+            before += mode_of(marks, order[i]) == mode
     return before < most
-
-
-@inlined
-def most_kept(marks: Marks, num: int, most: int) -> int:
-    """Return the largest number of `num` components that a cap of `most`, of each mode, may leave."""
-    return num if have_modes(marks) and most > 1 else min(num, max(1, most))
-
-
-@inlined
-def have_modes(marks: Marks) -> bool:
-    """Return True if the components have the column of modes."""
-    return marks.modes.shape[1] > 0
 
 
 @inlined
 def copy_marks(marks: Marks, source: int, out: Marks, target: int) -> None:
     """Copy the marks of component `source` to place `target`, in the columns that `out` has."""
     copy_updated_marks(marks, source, out, target)
-    set_mode(out, target, mode_of(marks, source))
+    out[target, MODE] = marks[source, MODE]
 
 
 @inlined
 def copy_updated_marks(marks: Marks, source: int, out: Marks, target: int) -> None:
     """Copy the marks that measurements change, in the columns that both have."""
-    for k in range(min(marks.log_class_probs.shape[1], out.log_class_probs.shape[1])):
-        out.log_class_probs[target, k] = marks.log_class_probs[source, k]
+    for k in range(CLASSES, min(marks.shape[1], out.shape[1])):
+        out[target, k] = marks[source, k]
 
 
 @inlined
 def may_merge(marks: Marks, first: int, second: int) -> bool:
     """True if two components may become one: of any classes, whose probabilities have a mean, and of one mode."""
-    return mode_of(marks, first) == mode_of(marks, second)
+    return marks[first, MODE] == marks[second, MODE]
 
 
 @borrowing
@@ -117,20 +97,20 @@ def merge_marks(marks: Marks, chosen: Ints, weights: Floats, count: int, out: Ma
     They are the mean class probabilities, and the mode. Of components of several modes the next is drawn as at birth.
     """
     set_mode(out, target, _common_mode(marks, chosen, count))
-    if out.log_class_probs.shape[1] == 0:
+    if out.shape[1] == CLASSES:
         return
-    total, logs = 0.0, marks.log_class_probs
+    total = 0.0
     for i in range(count):
         total += weights[i]
-    for k in range(out.log_class_probs.shape[1]):
+    for k in range(CLASSES, out.shape[1]):
         peak, mean = -math.inf, 0.0
         for i in range(count):
-            peak = max(peak, logs[chosen[i], k])
+            peak = max(peak, marks[chosen[i], k])
         if peak > -math.inf:
             for i in range(count):
                 share = weights[i] / total if total > 0.0 else 1.0 / count
-                mean += share * math.exp(logs[chosen[i], k] - peak)
-        out.log_class_probs[target, k] = peak + math.log(mean) if mean > 0.0 else -math.inf
+                mean += share * math.exp(marks[chosen[i], k] - peak)
+        out[target, k] = peak + math.log(mean) if mean > 0.0 else -math.inf
 
 
 @borrowing
@@ -145,23 +125,23 @@ def pool_marks(marks: Marks, chosen: Ints, powers: Floats, count: int, out: Mark
             log_factor = -math.inf
         mode = max(mode, mode_of(marks, chosen[i]))
     set_mode(out, target, mode)
-    if out.log_class_probs.shape[1] == 0:
+    if out.shape[1] == CLASSES:
         return log_factor
-    for k in range(out.log_class_probs.shape[1]):
-        out.log_class_probs[target, k] = 0.0
+    for k in range(CLASSES, out.shape[1]):
+        out[target, k] = 0.0
         for i in range(count):
-            out.log_class_probs[target, k] += powers[i] * marks.log_class_probs[chosen[i], k]
-    return log_factor + _normalise_classes(out.log_class_probs[target])
+            out[target, k] += powers[i] * marks[chosen[i], k]
+    return log_factor + _normalise_classes(out[target, CLASSES:])
 
 
 @inlined
 def update_marks(marks: Marks, c: int, measurements: Measurements, j: int, out: Marks, target: int) -> float:
     """Write the marks of component `c` after measurement `j`, and return the log of the factor of its weight."""
-    if out.log_class_probs.shape[1] == 0:
+    if out.shape[1] == CLASSES:
         return 0.0
-    for k in range(out.log_class_probs.shape[1]):
-        out.log_class_probs[target, k] = marks.log_class_probs[c, k] + measurements.class_ratios[j, k]
-    return _normalise_classes(out.log_class_probs[target])
+    for k in range(CLASSES, out.shape[1]):
+        out[target, k] = marks[c, k] + measurements.class_ratios[j, k - CLASSES]
+    return _normalise_classes(out[target, CLASSES:])
 
 
 @inlined
@@ -190,27 +170,14 @@ def _normalise_classes(log_class_probs: Floats) -> float:
     return log_sum
 
 
-def unmarked(num: int = 0) -> Marks:
-    """Marks of this number of components, with no column in use."""
-    return Marks(np.empty((num, 0)), np.empty((num, 0), np.int64))
-
-
-no_marks = kernel(unmarked)  # for kernels
-
-
 # From Python, on arrays of the library's own.
 
 
-def taken_marks(marks: Marks, places: Ints | slice) -> Marks:
-    """The marks at `places`, in that order."""
-    return Marks(marks.log_class_probs[places], marks.modes[places])
+def marks_of(log_class_probs: Floats | None = None, modes: Ints | None = None) -> Marks:
+    """Return the marks of components of these log class probabilities, (num, num_classes), and modes, (num,).
 
-
-def joined_marks(marks: Iterable[Marks]) -> Marks:
-    """The marks of all bundles, in their order."""
-    classes, modes = zip(*marks, strict=True)
-    try:
-        return Marks(np.concatenate(classes), np.concatenate(modes))
-    except ValueError:  # some have no column of modes
-        none = [np.full((len(each), 1 - each.shape[1]), NOT_DRAWN) for each in modes]
-        return Marks(np.concatenate(classes), np.concatenate([*map(np.hstack, zip(modes, none, strict=True))]))
+    Without either there are no classes, or no mode is drawn yet. At least one is expected.
+    """
+    num = max(len(given) for given in (log_class_probs, modes) if given is not None)
+    classes = np.empty((num, 0)) if log_class_probs is None else log_class_probs
+    return np.column_stack([np.full(num, NOT_DRAWN) if modes is None else modes, classes]).astype(np.float64)

@@ -15,7 +15,7 @@ from vedette.kernels.base.compile import kernel
 from vedette.kernels.base.types import Floats, Mixture, Motion, Tracks
 from vedette.kernels.gaussian.components import components_between, components_like, copy_component, make_components
 from vedette.kernels.gaussian.linalg import log_or_minus_inf
-from vedette.kernels.gaussian.marks import marks_with_modes, mode_of, set_mode
+from vedette.kernels.gaussian.marks import mode_of, set_mode
 from vedette.kernels.gaussian.prediction import predict, survival_probabilities
 from vedette.kernels.gaussian.reduction import MixtureCaps, make_reduction_work, reduce_into
 from vedette.kernels.gaussian.scratch import make_scratch
@@ -74,7 +74,7 @@ def _after_step(tracks: Tracks, motion: Motion, dt: float) -> Tracks:
     chain, dim, widest, room = motion.switching, given.means.shape[1], 0, num_modes * len(given.log_weights)
     for i in range(num):
         widest = max(widest, num_modes * (tracks.offsets[i + 1] - tracks.offsets[i]))
-    out = make_components(room, dim, marks_with_modes(given.marks, 0))
+    out = make_components(room, dim, given.marks)
     wide = components_like(out, widest)
     floor = math.log(_LIGHTEST) if chain.merge_distance > 0.0 else -math.inf
     caps = MixtureCaps(floor, chain.merge_distance, max(2, room))

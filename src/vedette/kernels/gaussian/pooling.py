@@ -17,9 +17,8 @@ from vedette.kernels.gaussian.components import (
     own_components,
 )
 from vedette.kernels.gaussian.linalg import log_sum
-from vedette.kernels.gaussian.marks import most_kept
 from vedette.kernels.gaussian.mixtures import require_gaussians
-from vedette.kernels.gaussian.reduction import MixtureCaps, make_reduction_work, reduce_into
+from vedette.kernels.gaussian.reduction import MixtureCaps, make_reduction_work, most_kept, reduce_into
 
 
 @kernel
@@ -94,7 +93,7 @@ def pooled_tracks(
         for p in range(pool_offsets[i], pool_offsets[i + 1]):
             size += tracks.offsets[pool[p] + 1] - tracks.offsets[pool[p]]
         largest = max(largest, size)
-        room += most_kept(tracks.components.marks, size, caps.max_components)
+        room += most_kept(size, caps)
     components, component_weights = np.empty(largest, np.int64), np.empty(largest)
     wide, work = components_like(tracks.components, largest), make_reduction_work(largest, tracks.components)
     offsets, out, given = np.zeros(num + 1, np.int64), components_like(tracks.components, room), tracks.components

@@ -18,7 +18,7 @@ from vedette.kernels.gaussian.components import (
     own_components,
 )
 from vedette.kernels.gaussian.linalg import cholesky, log_det_from_factor, log_sum, solve_lower
-from vedette.kernels.gaussian.marks import has_room, may_merge, most_kept
+from vedette.kernels.gaussian.marks import has_room, may_merge
 from vedette.kernels.gaussian.mixtures import sort_descending
 
 # Twice the Kullback-Leibler divergence up to which components of an intensity are merged, and the factor by which this
@@ -33,6 +33,12 @@ class MixtureCaps(NamedTuple):
     log_min_weight: float  # components below this, relative to the mixture's total weight, are dropped
     merge_distance: float  # Mahalanobis distance within which components are merged; 0 merges none
     max_components: int  # kept of each mode; 1 is one Gaussian of the moments of all components, the light ones too
+
+
+@inlined
+def most_kept(num: int, caps: MixtureCaps) -> int:
+    """Return the largest number of `num` components that the caps, which count for each mode, may leave."""
+    return num if caps.max_components > 1 else min(num, 1)
 
 
 class ReductionWork(NamedTuple):
@@ -175,7 +181,7 @@ def reduce_into(wide: Mixture, width: int, caps: MixtureCaps, work: ReductionWor
 def reduce_mixture(mixture: Mixture, caps: MixtureCaps) -> Mixture:
     """The reduced mixture, see `reduce_into`, in new arrays."""
     num = len(mixture.log_weights)
-    out = components_like(mixture, most_kept(mixture.marks, num, caps.max_components))
+    out = components_like(mixture, most_kept(num, caps))
     last = reduce_into(mixture, num, caps, make_reduction_work(num, mixture), out, 0)
     return components_between(out, 0, last)
 

@@ -11,8 +11,9 @@ import math
 import numpy as np
 
 from vedette.kernels.base.compile import inlined, kernel
-from vedette.kernels.base.types import Floats, Glmb, Ints, Lmb, Marks, Tracks
+from vedette.kernels.base.types import CLASSES, MODE, Floats, Glmb, Ints, Lmb, Marks, Tracks
 from vedette.kernels.gaussian.linalg import cholesky, log_sum
+from vedette.kernels.gaussian.marks import NOT_DRAWN
 
 _TOLERANCE = 0.5e-9  # of the log of sums that must be 1, and of symmetry, relative to the largest variance
 _LEAST_PIVOT = 1e-7  # of a Cholesky factor, relative to the standard deviation
@@ -63,8 +64,9 @@ def _is_gaussian(mean: Floats, cov: Floats, factor: Floats) -> bool:
 
 
 @inlined
-def _have_rows(marks: Marks, num: int) -> bool:
-    return len(marks.log_class_probs) == num and len(marks.modes) == num
+def _are_marks(marks: Marks, c: int) -> bool:
+    mode = marks[c, MODE]
+    return (marks.shape[1] == CLASSES or _sum_to_one(marks[c, CLASSES:])) and mode >= NOT_DRAWN and mode == int(mode)
 
 
 @kernel
@@ -72,9 +74,9 @@ def _are_mixtures(tracks: Tracks) -> bool:
     """Return True if every track is a density."""
     log_weights, means, covs, marks = tracks.components
     num, (num_components, dim) = len(tracks.labels), means.shape
-    if tracks.labels.shape[1] != 2 or dim == 0 or len(log_weights) != num_components:
+    if tracks.labels.shape[1] != 2 or dim == 0 or marks.shape[1] < CLASSES or len(log_weights) != num_components:
         return False
-    if covs.shape != (num_components, dim, dim) or not _have_rows(marks, num_components):
+    if covs.shape != (num_components, dim, dim) or len(marks) != num_components:
         return False
     if not _cuts(tracks.offsets, num, num_components, 1):
         return False
@@ -83,8 +85,8 @@ def _are_mixtures(tracks: Tracks) -> bool:
         if not _is_gaussian(means[i], covs[i], factor):
             return False
     are_normalised = True
-    for i in range(num_components if marks.log_class_probs.shape[1] > 0 else 0):
-        are_normalised &= _sum_to_one(marks.log_class_probs[i])
+    for i in range(num_components):
+        are_normalised &= _are_marks(marks, i)
     for track in range(num):
         are_normalised &= _sum_to_one(log_weights[tracks.offsets[track] : tracks.offsets[track + 1]])
     return are_normalised
