@@ -13,6 +13,8 @@ from vedette import models
 from vedette.densities import LMB, cardinality_distribution, existence_probabilities
 from vedette.errors import InputError
 from vedette.filters import FactoredGlmbFilter, Limits, SequentialFactoredFilter
+from vedette.kernels.gaussian.components import components_of
+from vedette.kernels.steps.faint_labels import Background, with_returned
 
 pytestmark = pytest.mark.lanes
 
@@ -208,6 +210,19 @@ def test_labels_of_steps_in_the_past_are_refused() -> None:
     belief, _ = tracker.step(tracker.initial(), [[0.0, 0.0]], POSE, 1.0, 5, rng=RNG)
     with pytest.raises(InputError, match="of which the last is 5; got 4"):
         tracker.step(belief, [[0.0, 0.0]], POSE, 1.0, 4, rng=RNG)
+
+
+@pytest.mark.parametrize("log_number", [-3.0, -711.0, -735.0])
+def test_faint_labels_return_to_any_number_of_undetected_targets(log_number: float) -> None:
+    """After a thousand empty scans, with a recorded camera, the number has no inverse in floating point."""
+    means, covs = np.array([[0.0, 0.0, 1.0, 0.0]]), np.diag([4.0, 4.0, 1.0, 1.0])[np.newaxis]
+    intensity = components_of(np.array([log_number]), means, covs)
+    returned = components_of(np.array([log_number - math.log(3.0)]), means + [2.0, 0.0, 0.0, 0.0], covs)
+    sites = np.array([[math.exp(log_number), 0.0, 0.0, 4.0, 4.0, 0.0]])
+    found = with_returned(intensity, np.empty((0, 0)), Background(sites, np.empty(0), np.zeros(6)), returned)
+    assert found.log_weights == pytest.approx([log_number + math.log(4.0 / 3.0)])
+    np.testing.assert_allclose(found.means, [[0.5, 0.0, 1.0, 0.0]])
+    np.testing.assert_allclose(found.covs[0], np.diag([4.75, 4.0, 1.0, 1.0]), atol=1e-15)
 
 
 @pytest.mark.parametrize("seed", [5, 22, 31])

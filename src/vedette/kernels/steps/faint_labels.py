@@ -127,9 +127,12 @@ def with_returned(intensity: Mixture, tables: Floats, background: Background, re
         if cell >= 0 and background.table[cell] > density:
             tables[0, cell] += weight
         elif site >= 0:
-            pair[0], pair[1], weights[0], weights[1] = site, num + k, math.exp(out.log_weights[site]), weight
+            total = log_add(out.log_weights[site], returned.log_weights[k])
+            pair[0], pair[1] = site, num + k
+            # Shares of the sum, which may be too small for a number of its own after a thousand empty scans.
+            weights[0], weights[1] = math.exp(out.log_weights[site] - total), math.exp(returned.log_weights[k] - total)
             merge_components(out, pair, weights, 2, one, 0)
-            one.log_weights[0] = log_add(out.log_weights[site], returned.log_weights[k])
+            one.log_weights[0] = total
             copy_component(one, 0, out, site)
         else:
             copy_component(returned, k, out, filled)
