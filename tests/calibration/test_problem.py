@@ -14,6 +14,7 @@ from vedette.calibration import Problem
 from vedette.scenarios.build import build_sensors
 from vedette.scenarios.calibration import build_problem
 from vedette.scenarios.from_recording import scenario_from_recording
+from vedette.scenarios.overrides import replace_fields
 from vedette.tracking import Central
 
 POSE = [0.0, 0.0, 0.5]
@@ -82,3 +83,18 @@ def test_births_do_not_hang_on_when_the_next_scan_comes(tmp_path: Path) -> None:
     assert (said.period, own.period) == (2.0, None)
     assert own.from_measurements.expected == pytest.approx(0.2 * times[-1] / (len(times) - 1) / 2.0)
     assert own.from_measurements.max_existence == said.from_measurements.max_existence
+
+
+def test_an_extent_is_estimated_where_the_file_has_one(tmp_path: Path) -> None:
+    write_recording(tmp_path, seconds=30.0)
+    (tmp_path / "radars.yaml").write_text(SENSORS, "utf-8")
+    scenario = scenario_from_recording(tmp_path / "radars.yaml", tmp_path / "scans.csv").scenario
+    assert not [each for each in build_problem(scenario).parameters if each.component == "extent"]
+    found = build_problem(replace_fields(scenario, {"sensors.1.noise.extent": 12.0}))
+    (own,) = [each for each in found.parameters if each.component == "extent"]
+    assert (own.sensor, own.name, own.unit, own.start) == (1, "noise.extent", "m", 12.0)
+    values = np.array([7.0 if each is own else each.start for each in found.parameters])
+    tracker, _ = found.tracker(values, found.births)
+    assert isinstance(tracker, Central)
+    first, second = (sensor.noise.params for sensor in tracker.sensors)
+    assert (first[4], second[4]) == (0.0, 7.0)

@@ -37,9 +37,11 @@ POLAR = (models.bearing_range(), "bearing_range")
 PLACE = (models.position(), "position")
 BEARING = (models.bearing_only(), "bearing_only")
 GROWING = models.range_dependent_noise(5.0, 5e-5, 0.02, 2e-5)
+EXTENDED = models.range_dependent_noise(5.0, 5e-5, 0.02, 2e-5, extent=30.0)
 SENSORS: dict[str, Any] = {
     "polar": (POLAR, GROWING, models.gaussian_detection(500.0), "auto", "centre"),
     "position": (PLACE, models.constant_noise([4.0, 7.0]), models.constant_detection(0.7), "auto", "centre"),
+    "extended": (POLAR, EXTENDED, models.gaussian_detection(500.0), "auto", "centre"),
     "wide": (POLAR, GROWING, models.gaussian_detection(500.0), "auto", "centre"),
     "wide position": (PLACE, models.constant_noise([4.0, 7.0]), models.constant_detection(0.7), "auto", "centre"),
     "one component": (BEARING, models.constant_noise([0.02]), models.gaussian_detection(500.0), "auto", "mean"),

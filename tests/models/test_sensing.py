@@ -196,3 +196,38 @@ def test_a_wrong_reach_is_detected():
         detection.check(STATES, POSE)
     with pytest.raises(InputError, match=r"DetectionModel\.reach: expected a number above 0; got 0"):
         replace(detection, reach=0.0)
+
+
+EXTENT = {
+    "bearing_range": {"sigma_range": 8.0, "eta_range": 1e-5, "sigma_bearing": 0.01, "eta_bearing": 1e-5},
+    "bearing_range_rate": {"sigma_range": 8.0, "sigma_bearing": 0.01, "sigma_range_rate": 0.5},
+    "bearing_only": {"sigma_bearing": 0.01, "eta_bearing": 1e-5},
+    "range_only": {"sigma_range": 8.0, "eta_range": 1e-5},
+}
+
+
+@pytest.mark.parametrize("kind", EXTENT)
+def test_an_extent_is_an_error_of_the_position_in_the_plane(kind):
+    measurement, own = MEASUREMENTS[kind][0], EXTENT[kind]
+    plain, wide = models.range_dependent_noise(**own), models.range_dependent_noise(**own, extent=6.6)
+    wide.check(STATES, POSE, measurement.meas_dim)
+    for state in STATES:
+        turned = jacobian(measurement, state, POSE)[:2, :2]
+        added = np.zeros((measurement.meas_dim,) * 2)
+        added[: len(turned), : len(turned)] = 6.6**2 * turned @ turned.T
+        np.testing.assert_allclose(cov(wide, state), cov(plain, state) + added, rtol=1e-12, atol=1e-15)
+
+
+def test_the_bearing_of_an_extent_is_within_a_radian_at_the_sensor():
+    noise = models.range_dependent_noise(sigma_bearing=0.01, extent=6.6)
+    at = np.array([*POSE[:2], 1.0, 0.0])
+    for offset in (0.0, 1.0, 6.6):
+        np.testing.assert_allclose(cov(noise, at + [offset, 0.0, 0.0, 0.0]), [[1.0001]])
+    with pytest.raises(InputError, match=r"extent: expected a number of at least 0; got -1"):
+        models.range_dependent_noise(sigma_bearing=0.01, extent=-1.0)
+
+
+def cov(noise, state):
+    out = np.full((noise.meas_dim, noise.meas_dim), np.nan)
+    noise.function(state, POSE, noise.params, out)
+    return out

@@ -136,7 +136,7 @@ def _with_noise(problem: Problem, values: Floats, stds: Floats, rates: float | N
     """
     values = values.copy()
     for i, each in enumerate(problem.parameters):
-        if each.kind == "noise":
+        if each.kind == "noise" and each.component != "extent":
             names = fitted(problem.sites[each.sensor].kind)
             own = stds[each.sensor, names.index(each.component)] if each.component in names else rates
             values[i] = each.start if own is None else abs(each.per_si) * own

@@ -26,7 +26,7 @@ class Parameter:
     Attributes:
         sensor: number of the sensor, from 0.
         kind: bias, noise, detection or clutter.
-        component: for a bias a field of `vedette.models.Bias`, for noise a component of the measurement.
+        component: for a bias a field of `vedette.models.Bias`, for noise a component of the measurement or "extent".
         name: as in the sensors file: "range", "noise.sigma_range".
         unit: "m", "deg", "s", "per scan", "".
         start: assumed value before estimation.

@@ -7,7 +7,7 @@ import numpy as np
 from vedette.errors import InputError
 from vedette.kernels.base.compile import inlined
 from vedette.kernels.base.types import Floats
-from vedette.kernels.gaussian.beam import offset_at_beam, passage
+from vedette.kernels.gaussian.beam import angle_of_extent, offset_at_beam, passage
 from vedette.models.arguments import float_array, non_negative, positive, reject
 from vedette.models.fields import NonNegativePair, PositivePair, Positives, part
 from vedette.models.functions import model_function
@@ -27,10 +27,10 @@ def _write_polar(state: Floats, pose: Floats, params: Floats, out: Floats) -> No
     square = dx * dx + dy * dy
     sigma_range = params[0] + params[1] * square
     sigma_bearing = params[2] + params[3] * np.sqrt(square)
-    out[0, 0] = sigma_bearing * sigma_bearing
+    out[0, 0] = sigma_bearing * sigma_bearing + angle_of_extent(params[4], square)
     out[0, 1] = 0.0
     out[1, 0] = 0.0
-    out[1, 1] = sigma_range * sigma_range
+    out[1, 1] = sigma_range * sigma_range + params[4] * params[4]
 
 
 @model_function("measurement_noise_cov")
@@ -44,21 +44,22 @@ def _with_third(state: Floats, pose: Floats, params: Floats, out: Floats) -> Non
     for i in range(2):
         out[i, 2] = 0.0
         out[2, i] = 0.0
-    out[2, 2] = params[4] * params[4]
+    out[2, 2] = params[5] * params[5]
 
 
 @model_function("measurement_noise_cov")
 def _bearing(state: Floats, pose: Floats, params: Floats, out: Floats) -> None:
     dx, dy = offset_at_beam(state, pose)
-    sigma_bearing = params[0] + params[1] * np.sqrt(dx * dx + dy * dy)
-    out[0, 0] = sigma_bearing * sigma_bearing
+    square = dx * dx + dy * dy
+    sigma_bearing = params[0] + params[1] * np.sqrt(square)
+    out[0, 0] = sigma_bearing * sigma_bearing + angle_of_extent(params[2], square)
 
 
 @model_function("measurement_noise_cov")
 def _range(state: Floats, pose: Floats, params: Floats, out: Floats) -> None:
     dx, dy = offset_at_beam(state, pose)
     sigma_range = params[0] + params[1] * (dx * dx + dy * dy)
-    out[0, 0] = sigma_range * sigma_range
+    out[0, 0] = sigma_range * sigma_range + params[2] * params[2]
 
 
 @model_function("measurement_noise_cov")
@@ -108,10 +109,12 @@ def range_dependent_noise(
     sigma_range_rate: float | None = None,
     sigma_elevation: float | None = None,
     sigma_altitude: float | None = None,
+    extent: float = 0.0,
 ) -> NoiseModel:
     """Noise that grows with the distance d of the target (paper section IV, paper-notes 3).
 
-    The standard deviations are sigma_range + eta_range d^2 and sigma_bearing + eta_bearing d. With only `sigma_bearing`
+    The standard deviations are sigma_range + eta_range d^2 and sigma_bearing + eta_bearing d. To their squares the
+    point of a large target that reflects adds extent^2 and (extent / d)^2, at most 1. With only `sigma_bearing`
     the model is for bearing-only sensors, with only `sigma_range` for range-only sensors, and with both for [bearing,
     range]. One of `sigma_range_rate`, `sigma_elevation` and `sigma_altitude` adds this third component. The distance is
     that in the plane.
@@ -124,7 +127,10 @@ def range_dependent_noise(
         sigma_range_rate: m/s, above 0, at every distance.
         sigma_elevation: rad, above 0, at every distance.
         sigma_altitude: m, above 0, at every distance.
+        extent: standard deviation of the reflecting point about the middle of the target, m, along and across the line
+            of sight. It is taken as independent from scan to scan.
     """
+    floor = non_negative("extent", extent)
     ranges = _growth("range", sigma_range, eta_range)
     bearings = _growth("bearing", sigma_bearing, eta_bearing)
     thirds = {"range_rate": sigma_range_rate, "elevation": sigma_elevation, "altitude": sigma_altitude}
@@ -136,13 +142,15 @@ def range_dependent_noise(
             raise reject(name, f"None beside {given_thirds[0][0]}, as one third component is measured", sigma)
     if given_thirds:
         std = positive(*given_thirds[0])
-        return NoiseModel(_with_third, np.array([*ranges, *bearings, std]), 3, np.array([bearings[0], ranges[0], std]))
+        return NoiseModel(
+            _with_third, np.array([*ranges, *bearings, floor, std]), 3, np.array([bearings[0], ranges[0], std])
+        )
     if ranges and bearings:
-        return NoiseModel(_bearing_range, np.array(ranges + bearings), 2, np.array([bearings[0], ranges[0]]))
+        return NoiseModel(_bearing_range, np.array([*ranges, *bearings, floor]), 2, np.array([bearings[0], ranges[0]]))
     if bearings:
-        return NoiseModel(_bearing, np.array(bearings), 1, np.array(bearings[:1]))
+        return NoiseModel(_bearing, np.array([*bearings, floor]), 1, np.array(bearings[:1]))
     if ranges:
-        return NoiseModel(_range, np.array(ranges), 1, np.array(ranges[:1]))
+        return NoiseModel(_range, np.array([*ranges, floor]), 1, np.array(ranges[:1]))
     raise InputError("sigma_range, sigma_bearing: expected at least one of them; got neither")
 
 

@@ -247,6 +247,10 @@ def _model_parameters(s: int, sensor: Sensor, scale: float) -> Iterator[Paramete
             yield Parameter(
                 s, "noise", component, f"noise.{name}", unit, start, per_si, "log", _UNKNOWN_LOG, scale * _USUAL_NOISE
             )
+    if (extent := getattr(noise, "extent", 0.0)) > 0.0:
+        yield Parameter(
+            s, "noise", "extent", "noise.extent", "m", extent, 1.0, "log", _UNKNOWN_LOG, scale * _USUAL_NOISE
+        )
     if (probability := getattr(sensor.detection, "probability", None)) is not None:
         start = min(max(probability, 1.0 - _MAX_PROBABILITY), _MAX_PROBABILITY)
         yield Parameter(s, "detection", "", "detection.probability", "", start, 1.0, "logit", _UNKNOWN_ODDS)

@@ -92,6 +92,15 @@ def offset_at_beam(state: Floats, pose: Floats) -> tuple[float, float]:
 
 
 @inlined
+def angle_of_extent(extent: float, square: float) -> float:
+    """Return the variance in bearing, rad^2, of an error of `extent` m across the line of sight, at most 1.
+
+    square: squared distance, m^2.
+    """
+    return extent * extent / max(square, extent * extent, 1e-300)
+
+
+@inlined
 def own_height(pose: Floats) -> float:
     """Return the sensor's height, m."""
     return pose[OWN_HEIGHT] if pose.shape[0] > OWN_HEIGHT else 0.0

@@ -14,6 +14,7 @@ import numpy as np
 from vedette.kernels.base.compile import borrowing, inlined, kernel
 from vedette.kernels.base.elementary import Bits, directions, exponentials, make_bits
 from vedette.kernels.base.types import Floats, Sensor
+from vedette.kernels.gaussian.beam import angle_of_extent
 from vedette.kernels.gaussian.detection import AT_CENTRE, checked, detection_probability
 from vedette.kernels.gaussian.scratch import Scratch
 from vedette.kernels.planning.lanes import copy_rows, place, put_rows, put_state, set_row, take_matrix, take_state
@@ -132,7 +133,7 @@ def fill_noise(
     params, noise = sensor.noise_params, scratch.measurement_noise
     if form == GROWING:
         bearings, ranges, squares, distances = out[0], out[2], offsets.squares, offsets.distances
-        near_range, far_range, near_bearing, far_bearing = params[0], params[1], params[2], params[3]
+        near_range, far_range, near_bearing, far_bearing, floor = params[0], params[1], params[2], params[3], params[4]
         for s in range(num):
             std = near_bearing + far_bearing * distances[s]
             bearings[s] = std * std
@@ -140,6 +141,9 @@ def fill_noise(
         for s in range(num):
             std = near_range + far_range * squares[s]
             ranges[s] = std * std
+        for s in range(num if floor > 0.0 else 0):
+            bearings[s] += angle_of_extent(floor, squares[s])
+            ranges[s] += floor * floor
     elif form == CONSTANT:
         for a in range(noise.shape[0]):
             for b in range(a + 1):

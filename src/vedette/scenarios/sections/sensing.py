@@ -27,7 +27,8 @@ def components(measurement: Measurement) -> tuple[int | None, tuple[int, ...]]:
 class RangeDependentNoise(Section):
     """Standard deviations that grow with the distance d (paper section IV), evaluated at the predicted state.
 
-    Range: sigma_range + eta_range d^2. Bearing: sigma_bearing + eta_bearing d. The others are constant.
+    Range: sigma_range + eta_range d^2. Bearing: sigma_bearing + eta_bearing d. The others are constant. The squares of
+    the first two have extent^2 and (extent / d)^2 added.
     """
 
     kind: Literal["range_dependent"] = Field(default="range_dependent", description="Kind of noise [-].")
@@ -45,6 +46,12 @@ class RangeDependentNoise(Section):
         default=None, description="Altitude, at every distance; needed where it is measured [m]."
     )
 
+    extent: float = Field(
+        default=0.0,
+        ge=0.0,
+        description="Standard deviation of the reflecting point of large targets, along and across the line of sight [m].",
+    )
+
     def build(self, folder: FilePath, *, kind: str, **_: Any) -> NoiseModel:
         """Return the measurement noise: the components that the kind of measurement has."""
         from vedette.models import range_dependent_noise
@@ -56,7 +63,7 @@ class RangeDependentNoise(Section):
             "elevation": {"sigma_elevation": math.radians(self.sigma_elevation_deg or 0.0)},
             "altitude": {"sigma_altitude": self.sigma_altitude},
         }
-        own: dict[str, Any] = {}
+        own: dict[str, Any] = {"extent": self.extent}
         for name in COMPONENTS[kind]:
             own |= parts[name]
         return range_dependent_noise(**own)
