@@ -2,6 +2,7 @@
 
     python benchmarks/stiff_motion.py --first 1000 --scenes 20      # modes are advised in this number of scenes
     python benchmarks/stiff_motion.py --kinds boats --first 0 --scenes 5 --show
+    python benchmarks/stiff_motion.py --ferry DATASET  # findings of the recordings of calibrating_recordings.py
 
 A scene is three to six targets for 150 s. Drawn over decades are: noise (.05 to .5 of the way in a second), the assumed
 process noise of constant velocity (.005 to .05 of the speed per square root of a second), and clutter (.3 to 20). Also
@@ -24,6 +25,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import yaml
+from calibrating_recordings import read, write_files
 from scenes import decades
 
 from vedette.evaluation.fit import Fit, fit_of_run
@@ -184,6 +186,17 @@ def fit_of(own: Scene) -> Fit:
         return fit_of_run(track_recording(recorded.scenario, recorded.recording), recorded.scenario)
 
 
+def show_ferry(dataset: Path) -> None:
+    """Print the findings of the recordings of a ferry's radar."""
+    for number in (2, 4, 5, 13, 17):
+        with tempfile.TemporaryDirectory() as folder:
+            scans, sensors = Path(folder, "scans.csv"), Path(folder, "radar.yaml")
+            write_files(read(dataset, number)[0], scans, sensors)
+            recorded = scenario_from_recording(sensors, scans)
+            fit = fit_of_run(track_recording(recorded.scenario, recorded.recording), recorded.scenario)
+        print(f"{number}:", *(each.text for each in fit.findings), sep="\n  ", flush=True)
+
+
 def main() -> None:
     """Read the arguments and print."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
@@ -192,7 +205,11 @@ def main() -> None:
     parser.add_argument("--kinds", nargs="+", choices=KINDS, default=KINDS)
     parser.add_argument("--modes", action="store_true", help="The filter has modes already.")
     parser.add_argument("--show", action="store_true", help="Print all findings.")
+    parser.add_argument("--ferry", type=Path, metavar="DATASET")
     given = parser.parse_args()
+    if given.ferry:
+        show_ferry(given.ferry)
+        return
     for kind in given.kinds:
         advised, others = list[int](), list[str]()
         for number in range(given.first, given.first + given.scenes):
