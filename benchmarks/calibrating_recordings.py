@@ -104,17 +104,22 @@ def true_errors(scans: list[Scan], vessels: dict[int, Floats]) -> dict[str, floa
     return dict(zip(("range", "bearing"), np.std(rows, axis=0).tolist(), strict=True))
 
 
-def row(dataset: Path, number: int, folder: Path) -> tuple[str, list[bool]]:
-    """Return the row of a scenario, and for each noise with an interval whether the true error is inside."""
-    scans, vessels = read(dataset, number)
-    rows, file, written = folder / "scans.csv", folder / "radar.yaml", folder / "calibrated.yaml"
+def write_files(scans: list[Scan], rows: Path, sensors: Path) -> None:
+    """Write the scans as rows, and the sensors file."""
     with rows.open("w", newline="") as opened:
         table = csv.writer(opened)
         table.writerow(["time", "sensor", "range_m", "bearing_rad", "own_x", "own_y"])
         for scan in scans:
             polar: list[tuple[Any, Any]] = [(math.hypot(x, y), math.atan2(x, y)) for x, y in scan.offsets]
             table.writerows([scan.time, "radar", *each, *scan.own] for each in polar or [("", "")])
-    file.write_text(SENSORS, "utf-8")
+    sensors.write_text(SENSORS, "utf-8")
+
+
+def row(dataset: Path, number: int, folder: Path) -> tuple[str, list[bool]]:
+    """Return the row of a scenario, and for each noise with an interval whether the true error is inside."""
+    scans, vessels = read(dataset, number)
+    rows, file, written = folder / "scans.csv", folder / "radar.yaml", folder / "calibrated.yaml"
+    write_files(scans, rows, file)
     recorded = scenario_from_recording(file, rows)
     found = calibrate(build_problem(recorded.scenario, biases=False))
     written.write_text(calibrated_text(recorded.scenario, file, found, folder), "utf-8")

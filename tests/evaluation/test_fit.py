@@ -89,15 +89,16 @@ def test_innovations_are_those_of_a_kalman_filter() -> None:
     start = next(k for k, each in enumerate(record.estimates) if len(each.means))
     mean, cov = record.estimates[start].means[0], record.estimates[start].covs[0]
     process = models.motion.noise_cov(mean, 1.0)
-    matches = zip(fit.matches.innovations, fit.matches.variances, strict=True)
+    matches = zip(fit.matches.innovations, fit.matches.variances, fit.matches.whitened, strict=True)
     assert len(fit.matches.labels) == record.num_scans - start - 1
-    for k, (innovation, variances) in enumerate(matches, start=start + 1):
+    for k, (innovation, variances, whitened) in enumerate(matches, start=start + 1):
         mean, cov = transition @ mean, transition @ cov @ transition.T + process
         scan = scans[k][0]
         assert isinstance(scan, np.ndarray)
         spread = cov[:2, :2] + 400.0 * np.eye(2)
         np.testing.assert_allclose(innovation, scan[0] - mean[:2], atol=1e-4)
         np.testing.assert_allclose(variances, np.diagonal(spread), rtol=1e-5)
+        np.testing.assert_allclose(np.linalg.cholesky(spread) @ whitened, innovation, atol=1e-4)
         gain = cov[:, :2] @ np.linalg.inv(spread)
         mean, cov = mean + gain @ innovation, cov - gain @ spread @ gain.T
     np.testing.assert_allclose(fit.noise_stds, 20.0)

@@ -20,7 +20,7 @@ from vedette.calibration.maximum_likelihood import (
     maximise,
     stds_from_blocks,
 )
-from vedette.calibration.parameters import Parameter, Problem
+from vedette.calibration.parameters import TARGETS, Parameter, Problem
 from vedette.kernels.base.types import Floats, Ints
 
 _QUANTILE = 1.959964  # of the normal distribution, 97.5 %
@@ -28,7 +28,8 @@ _COMPARED = ("clock", "x", "y")  # components that are relative to those of the 
 _NO_BETTER = "held-back scans fit no better with the estimate"
 _PART = 0.1  # share of a parameter in undetermined directions above which it is not identifiable
 _MOST_PRIORS = 5.0  # prior standard deviations within which an estimate is plausible
-_KINDS = ("clutter", "detection", "noise", "bias")  # in the order of their tests; those of a sensor are a group
+# In the order of their tests. Those of a sensor or of the motion are a group.
+_KINDS = ("clutter", "detection", "noise", "motion", "bias")
 
 
 class ParameterEstimate(NamedTuple):
@@ -186,11 +187,12 @@ def _without(parameter: Parameter, reason: str) -> ParameterEstimate:
 def _correlated(parameters: tuple[Parameter, ...]) -> list[list[int]]:
     """Return the groups of parameters that may be correlated: all biases, and per sensor noise, detection and clutter.
 
-    The information between biases and the rest is 0 if measurements are Gaussian.
+    Those of the motion may be correlated with all but biases. The information between biases and the rest is 0 if
+    measurements are Gaussian.
     """
     groups = [[i for i, each in enumerate(parameters) if each.kind == "bias"]]
     for s in sorted({each.sensor for each in parameters}):
-        groups.append([i for i, each in enumerate(parameters) if each.kind != "bias" and each.sensor == s])
+        groups.append([i for i, each in enumerate(parameters) if each.kind != "bias" and each.sensor in (s, TARGETS)])
     return groups
 
 
@@ -232,7 +234,8 @@ def _judged(
 def _why(problem: Problem, i: int, partners: list[int], is_apart: bool) -> str:
     """Return why a parameter is not identifiable. partners: the parameters that it cannot be separated from."""
     own, alone = problem.parameters[i], len(problem.sites) == 1
-    names = [f"{problem.parameters[j].label} of {problem.sites[problem.parameters[j].sensor].name}" for j in partners]
+    owners = [*(site.name for site in problem.sites), "targets"]
+    names = [f"{problem.parameters[j].label} of {owners[problem.parameters[j].sensor]}" for j in partners]
     if own.kind != "bias":
         return "not identifiable: the recording contains almost no information about this parameter"
     if alone or is_apart:

@@ -29,6 +29,7 @@ _UNEVEN = 4.0  # dispersion above which targets are not detected equally often
 _NEARER = 3.0  # multiple of the estimated noise, in the next round
 _MANY_SCANS = 20  # of a long straight piece
 _LASTING = 2.0  # ratio of errors about long and short pieces above which errors last; of white noise 1.1 to 1.7
+_CHANGES = 10.0  # of a mode in a recording, for a first standard deviation of its parameters
 _BIRTHS = 0.5, 5.0  # births and scans that the gamma prior of their rate counts for, as in tracking
 NO_SHARED = "no other sensor observes enough of the same targets"
 _OTHER_MOTION = "another motion of the targets than assumed"
@@ -116,7 +117,7 @@ def _expected_stds(problem: Problem, values: Floats, pairs: MatchedMeasurements)
     stds = np.array([each.unknown for each in problem.parameters])
     for i, each in enumerate(problem.parameters):
         num = {"noise": 2.0 * hits[each.sensor], "detection": hits[each.sensor] * (1.0 - values[i])}
-        num["clutter"] = values[i] * pairs.scans[each.sensor]
+        num |= {"clutter": values[i] * pairs.scans[each.sensor], "motion": _CHANGES}
         if each.kind in num:
             stds[i] = 1.0 / math.sqrt(max(float(num[each.kind]), 1.0))
     return stds

@@ -14,20 +14,22 @@ from vedette.kernels.base.types import Floats
 from vedette.recorded import RecordedScans, RecordedSensor, remove_biases
 from vedette.tracking import Tracker
 
-Kind = Literal["bias", "noise", "detection", "clutter"]
+Kind = Literal["bias", "noise", "detection", "clutter", "motion"]
+TARGETS = -1  # in place of the number of a sensor, for the motion of targets
 _AT_ONCE = 1e-6  # s; scans closer in time are simultaneous
 Scale = Literal["plain", "log", "logit"]
 
 
 @dataclass(frozen=True, slots=True)
 class Parameter:
-    """Parameter of a sensor.
+    """Parameter of a sensor, or of the motion of targets.
 
     Attributes:
-        sensor: number of the sensor, from 0.
-        kind: bias, noise, detection or clutter.
-        component: for a bias a field of `vedette.models.Bias`, for noise a component of the measurement or "extent".
-        name: as in the sensors file: "range", "noise.sigma_range".
+        sensor: number of the sensor, from 0, or `TARGETS`.
+        kind: bias, noise, detection, clutter or motion.
+        component: for a bias a field of `vedette.models.Bias`, for noise a component of the measurement or
+            "extent", for motion the name of a mode.
+        name: as in the sensors file: "range", "noise.sigma_range", "modes.cruise.stay_s".
         unit: "m", "deg", "s", "per scan", "".
         start: assumed value before estimation.
         per_si: value that corresponds to one SI unit, negative if the sign is reversed.
@@ -50,6 +52,8 @@ class Parameter:
     @property
     def label(self) -> str:
         """Name in words, such as "range bias"."""
+        if self.kind == "motion":
+            return self.name.removeprefix("modes.")
         component = self.component.replace("_", " ")
         if self.kind == "bias":
             return "clock offset" if self.component == "clock" else f"{component} bias"

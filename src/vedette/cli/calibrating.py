@@ -71,7 +71,7 @@ def calibrate(
     bad_rows: BadRows = "refuse",
     trust: Trust = False,
 ) -> None:
-    """Estimate sensor biases, noise, detection, clutter.
+    """Estimate sensor biases, noise, detection, clutter, and modes of motion.
 
     From recorded scans alone, by maximum likelihood, with 95 % intervals. Values that are implausible, or fit held-back
     scans no better, stay as in the file.
@@ -85,7 +85,7 @@ def calibrate(
         if out is not None:
             last = windows[-1].calibration._replace(converged=all(part.calibration.converged for part in windows))
             write_text(out, calibrated_text(recorded.scenario, sensors, last, out.parent))
-    names = recorded.scenario.model.sensor_names
+    names = _owners(recorded)
     print_windows(windows, names, position=position)
     if out is None:
         echo("Nothing was written. Add --out calibrated.yaml to save the estimates for `vedette track`.")
@@ -128,6 +128,11 @@ def _calibrate(
         return list(calibrate_windows(problem, window, progress))
 
 
+def _owners(recorded: RecordingScenario) -> tuple[str, ...]:
+    """Return the names of the sensors, and last the word for parameters of the motion, whose sensor is `TARGETS`."""
+    return *recorded.scenario.model.sensor_names, "targets"
+
+
 def _has_several_sensors(recorded: RecordingScenario) -> bool:
     """Return True if two sensors or more scan."""
     instants = recorded.recording.scans
@@ -149,7 +154,7 @@ def calibrate_doubtful(recorded: RecordingScenario, fit: Fit, sensors: Path) -> 
         return None
     with compiling(), _pass_counter() as progress:
         found = calibrate(problem, progress, doubtful)
-    names = recorded.scenario.model.sensor_names
+    names = _owners(recorded)
     print_windows([CalibrationWindow(0.0, math.inf, found)], names, position=False)
     text = calibrated_text(recorded.scenario, sensors, found, None)
     return text, calibration_document(found, names)
@@ -160,6 +165,8 @@ def _doubtful_parameters(problem: Problem, recorded: RecordingScenario, fit: Fit
     tests, names = {(each.sensor, each.test) for each in fit.findings}, recorded.scenario.model.sensor_names
 
     def is_doubtful(each: Parameter) -> bool:
+        if each.kind == "motion":  # no finding names modes
+            return True
         if each.kind == "bias" and (each.start == 0.0 or ("", "agreement") in tests):
             return True
         is_assumed = each.kind == "clutter" and "clutter" in recorded.assumed

@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike
 from vedette.evaluation.block_means import BLOCK, SURE, blocks, mean_of
 from vedette.evaluation.fit_by_place import LEAST_EXCESS, clutter_by_place, detection_by_place
 from vedette.evaluation.innovations import Assumed, Compared, Instant, Matches, SensorFit, compared, joined
+from vedette.evaluation.manoeuvres import manoeuvre_warnings
 from vedette.evaluation.scan_periods import period_findings
 from vedette.evaluation.scans import rows_of_record
 from vedette.evaluation.sensor_agreement import disagreement_warnings
@@ -27,13 +28,14 @@ from vedette.simulation.records import RunRecord
 
 NOTHING = "nothing, as no track spans two scans"
 _TESTS = (
-    "bias, noise, motion, detection and clutter, both also by place, several returns, periods, agreement of sensors, "
-    "fast targets"
+    "bias, noise, motion, manoeuvres, detection and clutter, both also by place, several returns, periods, agreement "
+    "of sensors, fast targets"
 )
 _MOST_SCANS, _STRETCH = 5000, 100  # that are looked at, in stretches of successive ones
 _LEAST_BIAS = 0.25  # of the noise's standard deviation; smaller ones cost no accuracy
 _SPREADS = (0.6, 1.5)  # of the assumed standard deviation; no finding within them
 _LEAST_DIFFERENCE = 0.1  # of the share of detected targets
+_BY_CHANCE = 0.01  # highest probability of a finding of manoeuvres in a run without any
 _RETURNS = 0.5  # further measurements of a target in a scan; two targets that cross slowly have some, too
 _MANY_PLACES = 5  # stationary places; fewer may be targets at rest
 _EDGE = 3  # matches at each end of a track, which depend on what was detected
@@ -110,6 +112,9 @@ def fit_of(instants: Sequence[Compared], assumed: Assumed, times: Sequence[Array
             fit = joined(fits)
             num += len(fit.matches.labels)
             findings += (Finding(test, name, f"{name}: {text}") for test, text in _of_sensor(fit, s, assumed))
+    if {"agreement", "bias"}.isdisjoint(each.test for each in findings):  # which move tracks from sensor to sensor
+        level = _BY_CHANCE if times is not None else 0.1 * _BY_CHANCE  # streams are tested again and again
+        findings += (Finding("manoeuvres", "", text) for text in manoeuvre_warnings(instants, assumed, level))
     findings += (Finding("fast targets", "", text) for text in unexplained_course_warnings(instants, assumed))
     scanned = times or [[each.time for each in instants if each.fits[s] is not None] for s in range(len(names))]
     findings += (Finding("period", *each) for each in period_findings(scanned, names, from_start=times is not None))

@@ -60,7 +60,8 @@ class Matches(NamedTuple):
     labels: (num, 2). offsets: (num, 2) predicted position relative to the sensor, m. probabilities: (num,) of a
     detection. numbers: (num,) measurements within the gate. by_chance: (num,) expected number of them that are clutter.
     innovations: (num, meas_dim) of the only measurement inside, NaN if there is not exactly one. variances: of them.
-    noise: (num, meas_dim) variances of the noise alone.
+    whitened: innovations in units of their standard deviations, without correlations (by Cholesky factors). noise:
+    (num, meas_dim) variances of the noise alone.
     """
 
     labels: Ints
@@ -70,13 +71,14 @@ class Matches(NamedTuple):
     by_chance: Floats
     innovations: Floats
     variances: Floats
+    whitened: Floats
     noise: Floats
 
     @classmethod
     def none(cls, dim: int) -> Matches:
         """Return no matches of a sensor of `dim` components."""
         flat, wide = np.empty(0), np.empty((0, dim))
-        return cls(np.empty((0, 2), np.int64), np.empty((0, 2)), flat, flat.astype(np.int64), flat, wide, wide, wide)
+        return cls(np.empty((0, 2), np.int64), np.empty((0, 2)), flat, flat.astype(np.int64), flat, *[wide] * 4)
 
     def by_label(self) -> list[Ints]:
         """Return the indices of the matches of each track, in order of time."""
@@ -215,12 +217,15 @@ def _of_scan(
         own = inside[single].argmax(axis=1) if len(single) else single
         residuals[single] = wrap_periodic(measured[own] - expected[single], periods)
         variances[single] = np.diagonal(spreads[single, own], axis1=1, axis2=2)
+        whitened = residuals.copy()
+        roots = np.linalg.cholesky(spreads[single, own])
+        whitened[single] = np.linalg.solve(roots, residuals[single, :, np.newaxis])[..., 0]
         probabilities, chance = (
             seen * sensor.mean_detection(means, covs, pose),
             _by_chance(sensor, expected, spread, pose),
         )
-        noises = np.diagonal(noise, axis1=1, axis2=2)
-        columns = labels, means[:, :2] - pose[:2], probabilities, numbers, chance, residuals, variances, noises
+        innovations = residuals, variances, whitened, np.diagonal(noise, axis1=1, axis2=2)
+        columns = labels, means[:, :2] - pose[:2], probabilities, numbers, chance, *innovations
         num, group = connected_components(_near(expected, spread, periods))
         matches = Matches(*(np.asarray(each)[np.bincount(group)[group] == 1] for each in columns))
         likely = np.zeros(num)

@@ -31,6 +31,7 @@ from vedette.recorded.scan_times import Bearings, sensor_bias
 from vedette.scenarios.build import build_sensors
 from vedette.scenarios.dumping import dump_data
 from vedette.scenarios.loading import Scenario
+from vedette.scenarios.motion_parameters import motion_parameters, with_motion_values
 from vedette.scenarios.recorded_data import recorded_scans, recorded_sensors
 from vedette.scenarios.sections.base import GaussianMethod
 from vedette.scenarios.sections.sensing import Clutter
@@ -66,9 +67,10 @@ def build_problem(
     """Return the calibration problem of a recording: its sensors' parameters, to be estimated.
 
     The parameters are biases of the measured quantities and of the clock, noise, probability of detection and clutter
-    rate, as far as each sensor has them. Clocks are relative to that of the first sensor. The measurement of the first
-    sensor is the reference if all sensors measure positions; with `position`, so are its place and bearing. The
-    likelihood is that of an LMB filter with sequential updates, with the motion, survival and births of the scenario.
+    rate, as far as each sensor has them, and of modes of motion the stays and noises. Clocks are relative to that of
+    the first sensor. The measurement of the first sensor is the reference if all sensors measure positions; with
+    `position`, so are its place and bearing. The likelihood is that of an LMB filter with sequential updates, with the
+    motion, survival and births of the scenario.
 
     Args:
         scenario: from `vedette.scenarios.from_recording`; one of sensors alone, for future scans, has no recording.
@@ -76,7 +78,7 @@ def build_problem(
         biases: False to leave out all biases.
         bearings: in which direction the biases of bearings count if there is no recording.
         prior_scale: factor on the prior standard deviations: 1 degree, 1 s, 1 m/s, and 5 m or 1 % of the range,
-            whichever is wider, for biases; half a unit of the logarithm for noise.
+            whichever is wider, for biases; half a unit of the logarithm for noise, and one for the motion.
     """
     model, folder = scenario.model, scenario.folder
     sites = tuple(recorded_sensors(model))
@@ -91,6 +93,7 @@ def build_problem(
                 usual = _usual_biases(recording, s, sites[s].kind, model.region.build(), prior_scale)
                 parameters += _bias_parameters(s, sensor, sites[s].bias, clockwise, position, only_positions, usual)
             parameters += _model_parameters(s, sensor, prior_scale)
+    parameters += motion_parameters(model.motion, prior_scale)
     filters = [sensor.filter for sensor in build_sensors(scenario)]
     region, method = model.region.build(), model.filter.gaussian_method
 
@@ -98,6 +101,9 @@ def build_problem(
 
     def tracker(values: Floats, births: float) -> tuple[Tracker, Floats]:
         targets = _births_per_scan(common_target_model(filters), recording.times, births)
+        if parameters and parameters[-1].kind == "motion":
+            motion = with_motion_values(model.motion, parameters, values.tolist())
+            targets = replace(targets, motion=motion.build(folder, method=method))
         models, added_rates = list[SensorModel](), np.zeros(len(model.sensors))
         biased = with_biases(sites, parameters, values)
         with suppress_unit_warnings():
@@ -262,10 +268,10 @@ def _model_parameters(s: int, sensor: Sensor, scale: float) -> Iterator[Paramete
 def _with_values(
     sensors: Sequence[Sensor], parameters: Sequence[Parameter], values: Sequence[float]
 ) -> tuple[Sensor, ...]:
-    """Return the sections of the sensors with these values of the parameters that are not biases."""
+    """Return the sections of the sensors with these values of their noise, detection and clutter."""
     updated = list(sensors)
     for parameter, value in zip(parameters, values, strict=True):
-        if parameter.kind != "bias":
+        if parameter.kind not in ("bias", "motion"):
             section = getattr(updated[parameter.sensor], parameter.kind)
             _, name, *indices = parameter.name.split(".")
             current = getattr(section, name)
@@ -303,6 +309,9 @@ def calibrated_text(scenario: Scenario, sensors: FilePath, calibration: Calibrat
         }
         for given, section, bias in zip(data["sensors"], sections, biases, strict=True)
     ]
+    if any(each.kind == "motion" for each in parameters):
+        motion = with_motion_values(scenario.model.motion, parameters, values)
+        data["motion"] = motion.model_dump(mode="json", exclude_unset=True)
     is_same = folder is not None and folder.resolve() == sensors.parent.resolve()
     text = dump_data(data, None if is_same else sensors.parent)
     return text if calibration.converged else f"{_NOT_CONVERGED}\n{text}"
