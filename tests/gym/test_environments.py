@@ -14,7 +14,7 @@ import pytest
 from gymnasium.utils.env_checker import check_env
 from pettingzoo.test import parallel_api_test, parallel_seed_test
 
-from vedette.densities import LMB
+from vedette.densities import LMB, as_lmb
 from vedette.errors import InputError
 from vedette.evaluation import ospa, run_scenario
 from vedette.gym import Observation, ScenarioEnv, ScenarioParallelEnv, expected_loss, policy_planner
@@ -30,6 +30,17 @@ KEPT = [{"kind": "stay_inside", "region": FENCE}, {"kind": "separation", "distan
 FENCED = {"control.constraints": KEPT}
 
 
+CRUISE = {"motion": {"kind": "constant_velocity", "sigma_v": 1.0}, "stay_s": 20.0}
+MODES = {
+    "kind": "modes",
+    "modes": {"cruise": CRUISE}
+    | {
+        name: {"motion": {"kind": "constant_turn", "turn_rate_deg": rate, "sigma_v": 1.0}, "stay_s": 8.0}
+        for name, rate in (("left", 15.0), ("right", -15.0))
+    },
+}
+
+
 def scene(name: str) -> Scenario:
     """A scenario by name, or a variant of paper-a: with LMBs; one of two sensors moves; a PHD filter alone; fenced."""
     paper = load_scenario("paper-a")
@@ -40,6 +51,7 @@ def scene(name: str) -> Scenario:
         "lmb": LMBS,
         "one moves": {**LMBS, "sensors.1.platform": {"kind": "stationary"}},
         "fenced": {**LMBS, **FENCED},
+        "modes": {**LMBS, "motion": MODES},
     }
     return replace_fields(paper, fields[name]) if name in fields else load_scenario(name)
 
@@ -78,7 +90,9 @@ def assert_same_run(first: RunRecord, second: RunRecord) -> None:
     assert [own.plan.chosen for own in first.decisions] == [own.plan.chosen for own in second.decisions]
 
 
-@pytest.mark.parametrize("name", ["paper-a", "paper-e", "six-cameras", "two-searchers", "one moves", "alone", "fenced"])
+@pytest.mark.parametrize(
+    "name", ["paper-a", "paper-e", "six-cameras", "two-searchers", "one moves", "alone", "fenced", "modes"]
+)
 def test_both_checkers_pass(name: str) -> None:
     """Warnings are errors here."""
     scenario = scene(name)
@@ -154,21 +168,41 @@ def test_beliefs_are_laid_out_by_existence() -> None:
     assert not any(array.any() for array in empty.values())
 
 
-@pytest.mark.parametrize("name", ["paper-a", "six-cameras", "one moves"])
+def test_beliefs_have_the_probabilities_of_modes() -> None:
+    env = ScenarioEnv(scene("modes"))
+    for observation, _ in episode(env, seed=2):
+        probs = observation["mode_probs"]
+        assert probs.shape == (10, 3)
+        fused, step = env.episodes.context.state.fused, env.episodes.context.state.step
+        if env.episodes.is_over:
+            break
+    found = belief_arrays(fused, step, 40, 3)
+    lmb = as_lmb(fused, max_components=10**6, merge_distance=0.0, log_min_weight=-math.inf)
+    own = lmb.tracks
+    sizes, modes = np.diff(own.offsets), own.marks.modes[:, 0]
+    table = np.zeros((len(sizes), 4))  # the last column is of targets without a mode yet
+    np.add.at(table, (np.repeat(np.arange(len(sizes)), sizes), modes), np.exp(own.log_weights))
+    wanted = table[np.argsort(-lmb.existence, kind="stable"), :3]
+    np.testing.assert_allclose(found["mode_probs"][: len(wanted)], wanted[:40], atol=1e-6)
+    assert found["mode_probs"][: len(wanted)].sum() > 2.0
+    assert not found["mode_probs"][len(wanted) :].any()
+
+
+@pytest.mark.parametrize("name", ["paper-a", "six-cameras", "one moves", "modes"])
 def test_the_page_has_the_layout(name: str) -> None:
     """Names, shapes and types of the table of docs/gym-observations.md, in its order."""
     env = ScenarioEnv(scene(name))
     env.reset(seed=1)
     layout, (num_sensors, pose_dim) = env.episodes.layout, env.world.experiment.poses.shape
-    sizes = {"L": 10, "d": env.world.truth.states.shape[1], "S": num_sensors, "p": pose_dim, "2": 2}
+    sizes = {"L": 10, "d": env.world.truth.states.shape[1], "S": num_sensors, "p": pose_dim, "2": 2, "M": 3}
     sizes |= {"D": len(layout.deciding), "A": max(layout.num_actions)}
     sizes["U"] = math.prod(layout.shapes.get("undetected", ()))
     page = (Path(__file__).parents[2] / "docs/gym-observations.md").read_text("utf-8")
-    rows = re.findall(r"^\| `(\w+)` \| ([LdSpDAU2, ]+) \| (float32|int8) \|", page, re.MULTILINE)
+    rows = re.findall(r"^\| `(\w+)` \| ([LdSpDAUM2, ]+) \| (float32|int8) \|", page, re.MULTILINE)
     told = {name: (tuple(sizes[own] for own in shape.split(", ")), kind) for name, shape, kind in rows}
     spaces = dict(env.observation_space.items())  # type: ignore[attr-defined]
-    if "undetected" not in spaces:
-        del told["undetected"]
+    for optional in {"undetected", "mode_probs"} - spaces.keys():
+        del told[optional]
     assert told == {name: (own.shape, str(own.dtype)) for name, own in spaces.items()}
 
 
