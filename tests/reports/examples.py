@@ -52,3 +52,14 @@ MIXED_SENSORS: dict[str, Any] = {
     "sensors.1.clutter": {"kind": "measurement_space", "rate": 4.0, "low": [0.0], "high": [2000.0]},
     "sensors.1.detection": {"kind": "limited_range", "probability": 0.95, "max_range": 1200.0},
 }
+
+# A target that turns at times.
+MODES: dict[str, Any] = {
+    "motion": {
+        "kind": "modes",
+        "modes": {
+            "cruise": {"motion": {"kind": "constant_velocity", "sigma_v": 1.0}, "stay_s": 20.0},
+            "turn": {"motion": {"kind": "constant_turn", "turn_rate_deg": 15.0, "sigma_v": 1.0}, "stay_s": 8.0},
+        },
+    }
+}
