@@ -14,9 +14,11 @@ import pytest
 from gymnasium.utils.env_checker import check_env
 from pettingzoo.test import parallel_api_test, parallel_seed_test
 
-from vedette.densities import LMB, as_lmb
+from vedette import models
+from vedette.densities import LMB
 from vedette.errors import InputError
 from vedette.evaluation import ospa, run_scenario
+from vedette.filters import LmbFilter
 from vedette.gym import Observation, ScenarioEnv, ScenarioParallelEnv, expected_loss, policy_planner
 from vedette.gym.observing import belief_arrays
 from vedette.scenarios import Scenario, load_scenario, replace_fields
@@ -42,16 +44,18 @@ MODES = {
 
 
 def scene(name: str) -> Scenario:
-    """A scenario by name, or a variant of paper-a: with LMBs; one of two sensors moves; a PHD filter alone; fenced."""
+    """A scenario by name, or a variant of paper-a: LMBs; one of two moves; a PHD filter alone; fenced; modes."""
     paper = load_scenario("paper-a")
     if name == "alone":
         first = paper.model.model_dump(mode="json")["sensors"][:1]
         return replace_fields(paper, {**ALONE, "sensors": first})
+    if name == "modes":
+        first = paper.model.model_dump(mode="json")["sensors"][:1]
+        return replace_fields(paper, {**ALONE, "filter.kind": "lmb", "motion": MODES, "sensors": first})
     fields: dict[str, dict[str, Any]] = {
         "lmb": LMBS,
         "one moves": {**LMBS, "sensors.1.platform": {"kind": "stationary"}},
         "fenced": {**LMBS, **FENCED},
-        "modes": {**LMBS, "motion": MODES},
     }
     return replace_fields(paper, fields[name]) if name in fields else load_scenario(name)
 
@@ -169,23 +173,22 @@ def test_beliefs_are_laid_out_by_existence() -> None:
 
 
 def test_beliefs_have_the_probabilities_of_modes() -> None:
-    env = ScenarioEnv(scene("modes"))
-    for observation, _ in episode(env, seed=2):
-        probs = observation["mode_probs"]
-        assert probs.shape == (10, 3)
-        fused, step = env.episodes.context.state.fused, env.episodes.context.state.step
-        if env.episodes.is_over:
-            break
-    found = belief_arrays(fused, step, 40, 3)
-    lmb = as_lmb(fused, max_components=10**6, merge_distance=0.0, log_min_weight=-math.inf)
-    own = lmb.tracks
-    sizes, modes = np.diff(own.offsets), own.marks.modes[:, 0]
-    table = np.zeros((len(sizes), 4))  # the last column is of targets without a mode yet
-    np.add.at(table, (np.repeat(np.arange(len(sizes)), sizes), modes), np.exp(own.log_weights))
-    wanted = table[np.argsort(-lmb.existence, kind="stable"), :3]
-    np.testing.assert_allclose(found["mode_probs"][: len(wanted)], wanted[:40], atol=1e-6)
-    assert found["mode_probs"][: len(wanted)].sum() > 2.0
-    assert not found["mode_probs"][len(wanted) :].any()
+    motion = models.Modes((models.constant_velocity(1.0),) * 2, (1e6, 1e6), at_birth=(0.25, 0.75))
+    sites = np.array([[0.0, 0.0, 1.0, 0.0], [500.0, 0.0, 1.0, 0.0]])
+    birth = models.BirthModel(np.array([0.8, 0.6]), sites, np.tile(np.eye(4), (2, 1, 1)), steps=frozenset({1}))
+    sensor = models.SensorModel(
+        models.position(),
+        models.constant_noise([3.0, 3.0]),
+        models.constant_detection(0.1),
+        models.region_clutter(1.0, models.Region(-1e3, 1e3, -1e3, 1e3), "position"),
+    )
+    tracker = LmbFilter(models.TargetModel(motion, models.constant_survival(1.0), birth), sensor)
+    belief, rng, none = tracker.initial(), np.random.default_rng(0), np.empty((0, 2))
+    for step, wanted in ((1, [0.0, 0.0]), (2, [0.25, 0.75])):  # drawn at the first prediction
+        belief, _ = tracker.step(belief, none, np.zeros(3), 1.0, step, rng=rng)
+        found = belief_arrays(belief, step, 3, 2)["mode_probs"]
+        np.testing.assert_allclose(found, [wanted, wanted, [0.0, 0.0]], atol=1e-4)
+    assert "mode_probs" not in belief_arrays(belief, 2, 3)
 
 
 @pytest.mark.parametrize("name", ["paper-a", "six-cameras", "one moves", "modes"])

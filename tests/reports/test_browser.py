@@ -252,7 +252,7 @@ def test_modes_have_colours_and_a_legend(browser: Browser, tmp_path: Path) -> No
         tmp_path / "report.html",
     )
     page = browser.open(tmp_path / "report.html")
-    choose(page, "scrubber", "25")
+    choose(page, "scrubber", "12")
     assert text(page, "modes-key").split() == ["in", "mode", "cruise", "in", "mode", "turn"]
     legend = "document.querySelector('[data-part=modes-key]').hidden"
     before = page.evaluate("document.querySelector('[data-part=scene]').toDataURL()")
