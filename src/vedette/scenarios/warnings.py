@@ -14,6 +14,7 @@ from vedette.scenarios.coastline import coastline_warnings
 from vedette.scenarios.coverage_warnings import coverage_warnings
 from vedette.scenarios.diagnostics import Diagnostic, Path
 from vedette.scenarios.loading import Scenario, locate_fault, read_document
+from vedette.scenarios.mode_warnings import mode_warnings
 from vedette.scenarios.new_targets import new_target_warnings
 from vedette.scenarios.sections import ScenarioModel
 from vedette.scenarios.sections.birth_labels import (
@@ -67,7 +68,7 @@ def scenario_warnings(scenario: Scenario, more: Iterable[tuple[Path, str]] = ())
     ]
     warnings += coverage_warnings(scenario.model)
     warnings += [*_undetected_births(scenario.model), *_missed_targets(scenario)]
-    warnings += [*start_warnings(scenario), *new_target_warnings(scenario)]
+    warnings += [*start_warnings(scenario), *new_target_warnings(scenario), *mode_warnings(scenario)]
     warnings += [*implausible_settings(scenario.model), *coastline_warnings(scenario.model, scenario.folder), *more]
     if not warnings:
         return ()
