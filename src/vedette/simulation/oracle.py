@@ -200,20 +200,17 @@ class OraclePlanner:
         motion = self._motion
         dim, num = motion.state_dim, len(ids)
         states, alive = np.full((last - first + 1, num, dim), np.nan), np.zeros((last - first + 1, num))
-        factors = np.ones(alive.shape)
         for k in range(len(states)):
             present, present_states = truth.at(first - 1 + k)
             _, columns, rows = np.intersect1d(ids, present, assume_unique=True, return_indices=True)
             states[k] = states[max(k - 1, 0)]
             states[k, columns], alive[k, columns] = present_states[rows], 1.0
-            factors[k, columns] = truth.detection_factors_at(first - 1 + k)[rows]
         steps = list(zip(states[:-1], np.diff(times[first - 1 : last]).tolist(), strict=True))
         truths = []
         for sensor, poses, scanned in zip(self.sensors, courses, scans, strict=True):
             information = np.zeros((*poses.shape[:2], num, dim, dim))
             for course, k in np.argwhere(scanned).tolist():
-                pose, seen = poses[course, k], factors[k + 1]
-                information[course, k] = scan_information(sensor.filter.sensor, states[k + 1], pose, seen)
+                information[course, k] = scan_information(sensor.filter.sensor, states[k + 1], poses[course, k])
             truths.append(information)
         return CovarianceRecursion(
             np.array([transition_jacobians(motion, x, dt) for x, dt in steps]).reshape(len(steps), num, dim, dim),

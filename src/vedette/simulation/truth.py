@@ -79,10 +79,6 @@ class Truth(SummaryRepr):
         float_array("Truth.states", self.states, (int(offsets[-1]), None))
         if self.ids.shape != (offsets[-1],) or (self.ids < 0).any():
             raise reject("Truth.ids", f"{offsets[-1]} ids of at least 0", self.ids)
-        if self.detection_factors is not None:
-            factors = float_array("Truth.detection_factors", self.detection_factors, (int(offsets[-1]),))
-            if (factors < 0.0).any() or (factors > 1.0).any():
-                raise reject("Truth.detection_factors", "numbers in [0, 1]", factors)
         scans = self.scans
         order = np.lexsort((self.ids, scans))
         twice = (np.diff(self.ids[order]) == 0) & (np.diff(scans[order]) == 0)

@@ -18,8 +18,7 @@ Bools = NDArray[np.bool_]
 # States begin with the position, those of four components or more also with the velocity. Others are found by name.
 VX, VY = 2, 3
 VELOCITY = slice(VX, VY + 1)  # m/s
-# The longest step of a chain of modes, in mean stays in the mode that is left fastest: a target changes at most once in
-# most steps. A longer time is divided.
+# Longest step of a chain of modes, in mean stays in the mode that is left fastest. A longer time is divided.
 LONGEST_MODE_STEP = 0.25
 HEIGHT, CLIMB = "pz", "vz"  # names of the height, m, and the vertical velocity, m/s
 PLANE = ("px", "py", "vx", "vy")
