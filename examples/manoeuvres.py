@@ -1,4 +1,4 @@
-"""Targets that turn: the coordinated turn beside the constant velocity, on the same scans.
+"""Targets that turn: coordinated turn, modes and constant velocity on the same scans.
 
     python examples/manoeuvres.py [--picture FILE]
 
@@ -51,6 +51,12 @@ def sensor() -> models.SensorModel:
     )
 
 
+def modes() -> models.Modes:
+    """Straight on, and turns to both sides, at rates that are not those of the target."""
+    turns = [models.constant_turn(np.radians(rate), 0.3) for rate in (5.0, -5.0)]
+    return models.Modes([models.constant_velocity(0.1), *turns], stay_s=(30.0, 20.0, 20.0))
+
+
 def main() -> tuple[np.ndarray, dict[str, np.ndarray]]:
     states, rng = path(), np.random.default_rng(2)
     scans = [simulate_scan(state[None, :4], POSE, sensor(), rng=rng).measurements for state in states]
@@ -58,6 +64,7 @@ def main() -> tuple[np.ndarray, dict[str, np.ndarray]]:
         "coordinated turn": models.coordinated_turn(0.3, np.radians(0.7)),
         "constant velocity, 0.3 m/s²": models.constant_velocity(0.3),
         "constant velocity, 3 m/s²": models.constant_velocity(3.0),
+        "modes of motion": modes(),
     }
     found = {name: track(motion, scans, states[0]) for name, motion in motions.items()}
     turning = states[:, 4] != 0.0

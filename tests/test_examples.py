@@ -113,7 +113,11 @@ SHOWN = {
     "examples/hundred_sensors.py": ["900 courses of 100 sensors"],
     "examples/late_scans.py": ["26 of 60 scans dropped", "0 of 60 scans dropped"],
     "examples/limited_views.py": ["of the targets in sight tracked"],
-    "examples/manoeuvres.py": ["0.3 m/s²  mean error", "lost after 41 s"],
+    "examples/manoeuvres.py": [
+        "0.3 m/s²  mean error",
+        "lost after 41 s",
+        "modes of motion              mean error  12.3 m",
+    ],
     "examples/own_campaign.py": ["near_farthest nearest sensor", "m to jdm"],
     "examples/own_fusion.py": ["own: the surest sensor   OSPA"],
     "examples/own_motion.py": ["with the current              mean error  26.4 m"],

@@ -90,7 +90,7 @@ def test_the_layout_of_this_version_is_as_written_here():
         "scans": "step time_s num_targets num_estimates ospa_m localisation_m cardinality_m "
         "fusion_num_sets fusion_num_lost_labels fusion_empty_intersection fusion_log_normaliser "
         "fusion_discarded_weight",
-        "truth": "step time_s target state_*",
+        "truth": "step time_s target state_* detection_factor*",
         "tracks": "step time_s birth_step birth_site existence mean_* cov_* class_* mode_*",
         "sensors": "step time_s sensor x_m y_m heading_rad log_likelihood num_hypotheses num_tracks "
         "truncation_error_bound dropped_existence num_clutter_floored num_duplicates num_inexact_clusters "

@@ -15,7 +15,7 @@ from filters.examples import DT, Scene, assert_same_glmb, assert_same_lmb, linea
 from reference import Floats, gaussian
 from reference import glmb as oracle
 from vedette import models
-from vedette.densities import LabelledDensity, as_glmb, as_lmb
+from vedette.densities import LabelledDensity, Poisson, as_glmb, as_lmb
 from vedette.errors import InputError
 from vedette.filters import (
     CbMemberFilter,
@@ -28,7 +28,8 @@ from vedette.filters import (
     MultiSensorLmbFilter,
     PhdFilter,
 )
-from vedette.kernels.gaussian.modes import mode_probabilities
+from vedette.kernels.gaussian.modes import mode_transitions, predicted_intensity
+from vedette.tracking.births import births_from_scans
 
 pytestmark = pytest.mark.lanes
 
@@ -138,13 +139,13 @@ def test_probabilities_of_modes_are_the_exponential():
         rates = rng.exponential(1.0, (num, num)) * (1.0 - np.eye(num))
         rates -= np.diag(rates.sum(axis=1))
         for dt in (1e-9, 0.01, 1.0, 30.0):
-            np.testing.assert_allclose(mode_probabilities(rates, dt), expm(rates * dt), rtol=0, atol=1e-13)
+            np.testing.assert_allclose(mode_transitions(rates, dt), expm(rates * dt), rtol=0, atol=1e-13)
 
 
 def test_modes_after_a_long_time_do_not_depend_on_the_first():
     rates = np.array([[-0.2, 0.2], [0.05, -0.05]])
     for dt in (1e3, 1e5, 1e9):
-        np.testing.assert_allclose(mode_probabilities(rates, dt), [[0.2, 0.8]] * 2, rtol=1e-10)
+        np.testing.assert_allclose(mode_transitions(rates, dt), [[0.2, 0.8]] * 2, rtol=1e-10)
 
 
 @models.model_function("transition")
@@ -239,3 +240,78 @@ def test_one_target_is_an_interacting_multiple_model(kind):
             assert sorted(own.modes) == [0, 1, 2]
             order = np.argsort(own.modes)
             np.testing.assert_allclose(weights[order], wanted[step][2], rtol=0, atol=1e-8)
+
+
+def seen_and_dim(factor: float, **more: Any) -> models.Modes:
+    """A target at rest, detected with the sensor's probability or a factor of it."""
+    still = models.constant_velocity(0.0)
+    return models.Modes((still, still), (1e9, 1e9), detection_factors=(1.0, factor), merge_distance=0.0, **more)
+
+
+def disc_sensor(reach: float) -> models.SensorModel:
+    """Positions of targets within a distance."""
+    return models.SensorModel(
+        models.position(),
+        models.constant_noise([5.0, 5.0]),
+        models.limited_range(0.95, reach),
+        models.region_clutter(1e-3, models.Region(-500.0, 500.0, -500.0, 500.0), "position"),
+        detection_at="mean",
+    )
+
+
+def after_two_scans(modes: models.Modes, sensor: models.SensorModel, last: Floats) -> LabelledDensity:
+    """A target at (100, 0) m after a scan from afar and one from the origin."""
+    mean, cov = np.array([100.0, 0.0, 0.0, 0.0]), np.diag([100.0, 100.0, 1e-6, 1e-6])
+    birth = models.BirthModel(np.array([0.9]), mean[None], cov[None], steps=frozenset({1}))
+    tracker = LmbFilter(models.TargetModel(modes, models.constant_survival(1.0), birth), sensor, Limits.none())
+    rng, none = np.random.default_rng(0), np.empty((0, 2))
+    belief, _ = tracker.step(tracker.initial(), none, np.array([1e5, 0.0, 0.0]), DT, 1, rng=rng)
+    return tracker.step(belief, last, np.zeros(3), DT, 2, rng=rng)[0]
+
+
+def test_at_the_edge_of_view_a_miss_counts_the_factor_of_the_mode():
+    belief = after_two_scans(seen_and_dim(0.6, at_birth=(0.5, 0.5)), disc_sensor(100.0), np.empty((0, 2)))
+    points = np.random.default_rng(1).normal(size=(400_000, 2)) * 10.0 + [100.0, 0.0]
+    visible = 0.95 * (np.hypot(*points.T) <= 100.0)
+    order = np.argsort(belief.tracks.marks.modes[:, 0])
+    totals = []
+    for c, factor in zip(order, (1.0, 0.6), strict=True):
+        weights = 1.0 - factor * visible
+        totals.append(weights.mean())
+        mean = weights @ points / weights.sum()
+        spread = points - mean
+        np.testing.assert_allclose(belief.tracks.means[c, :2], mean, atol=0.6)
+        assert mean[0] > 102.0
+        np.testing.assert_allclose(
+            belief.tracks.covs[c, :2, :2], (weights * spread.T) @ spread / weights.sum(), atol=14.0
+        )
+    weights = np.exp(belief.tracks.log_weights[order])
+    np.testing.assert_allclose(weights, np.array(totals) / sum(totals), atol=0.02)
+
+
+def test_a_hidden_target_explains_no_measurement():
+    sensor, scan = disc_sensor(1e4), np.array([[101.0, 2.0]])
+    measured = models.MeasurementBirth(0.1, 0.05, np.array([5.0, 5.0, 1.0, 1.0]))
+    birth = models.BirthModel(np.empty(0), np.empty((0, 4)), np.empty((0, 4, 4)), from_measurements=measured)
+    for at_birth, hidden in (((0.0, 1.0), True), ((1.0, 0.0), False)):
+        modes = seen_and_dim(0.0, at_birth=at_birth)
+        belief = after_two_scans(modes, sensor, np.empty((0, 2)))
+        found = births_from_scans(birth, belief, [sensor], [scan], [np.zeros(3)], 3, motion=modes)
+        assert found is not None
+        assert (len(found.existence) == 1 and found.existence[0] > 0.04) == hidden
+
+
+def test_a_light_component_of_many_targets_is_kept_as_that_of_one():
+    modes = models.Modes(
+        (models.constant_velocity(1.0), models.constant_velocity(1.0)), (1e3, 1e3), at_birth=(0.5, 0.5)
+    )
+    motion = models.motion_of_filter(modes, models.constant_survival(1.0))
+    for num in (1, 1000):
+        weights = np.append(np.ones(num), 1e-4)
+        means = np.zeros((num + 1, 4))
+        means[:, 0] = 1e3 * np.arange(num + 1)
+        intensity = Poisson(np.log(weights), means, np.tile(np.eye(4), (num + 1, 1, 1))).to_kernel()
+        for scale in (1.0, 1.0 / weights.sum()):  # a CPHD filter's weights sum to 1
+            scaled = intensity._replace(log_weights=intensity.log_weights + math.log(scale))
+            moved = predicted_intensity(scaled, motion, 1.0)
+            assert np.count_nonzero(moved.means[:, 0] > 1e3 * num - 500.0) == 2

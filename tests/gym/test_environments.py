@@ -14,9 +14,11 @@ import pytest
 from gymnasium.utils.env_checker import check_env
 from pettingzoo.test import parallel_api_test, parallel_seed_test
 
+from vedette import models
 from vedette.densities import LMB
 from vedette.errors import InputError
 from vedette.evaluation import ospa, run_scenario
+from vedette.filters import LmbFilter
 from vedette.gym import Observation, ScenarioEnv, ScenarioParallelEnv, expected_loss, policy_planner
 from vedette.gym.observing import belief_arrays
 from vedette.scenarios import Scenario, load_scenario, replace_fields
@@ -30,12 +32,26 @@ KEPT = [{"kind": "stay_inside", "region": FENCE}, {"kind": "separation", "distan
 FENCED = {"control.constraints": KEPT}
 
 
+CRUISE = {"motion": {"kind": "constant_velocity", "sigma_v": 1.0}, "stay_s": 20.0}
+MODES = {
+    "kind": "modes",
+    "modes": {"cruise": CRUISE}
+    | {
+        name: {"motion": {"kind": "constant_turn", "turn_rate_deg": rate, "sigma_v": 1.0}, "stay_s": 8.0}
+        for name, rate in (("left", 15.0), ("right", -15.0))
+    },
+}
+
+
 def scene(name: str) -> Scenario:
-    """A scenario by name, or a variant of paper-a: with LMBs; one of two sensors moves; a PHD filter alone; fenced."""
+    """A scenario by name, or a variant of paper-a: LMBs; one of two moves; a PHD filter alone; fenced; modes."""
     paper = load_scenario("paper-a")
     if name == "alone":
         first = paper.model.model_dump(mode="json")["sensors"][:1]
         return replace_fields(paper, {**ALONE, "sensors": first})
+    if name == "modes":
+        first = paper.model.model_dump(mode="json")["sensors"][:1]
+        return replace_fields(paper, {**ALONE, "filter.kind": "lmb", "motion": MODES, "sensors": first})
     fields: dict[str, dict[str, Any]] = {
         "lmb": LMBS,
         "one moves": {**LMBS, "sensors.1.platform": {"kind": "stationary"}},
@@ -78,7 +94,9 @@ def assert_same_run(first: RunRecord, second: RunRecord) -> None:
     assert [own.plan.chosen for own in first.decisions] == [own.plan.chosen for own in second.decisions]
 
 
-@pytest.mark.parametrize("name", ["paper-a", "paper-e", "six-cameras", "two-searchers", "one moves", "alone", "fenced"])
+@pytest.mark.parametrize(
+    "name", ["paper-a", "paper-e", "six-cameras", "two-searchers", "one moves", "alone", "fenced", "modes"]
+)
 def test_both_checkers_pass(name: str) -> None:
     """Warnings are errors here."""
     scenario = scene(name)
@@ -154,21 +172,40 @@ def test_beliefs_are_laid_out_by_existence() -> None:
     assert not any(array.any() for array in empty.values())
 
 
-@pytest.mark.parametrize("name", ["paper-a", "six-cameras", "one moves"])
+def test_beliefs_have_the_probabilities_of_modes() -> None:
+    motion = models.Modes((models.constant_velocity(1.0),) * 2, (1e6, 1e6), at_birth=(0.25, 0.75))
+    sites = np.array([[0.0, 0.0, 1.0, 0.0], [500.0, 0.0, 1.0, 0.0]])
+    birth = models.BirthModel(np.array([0.8, 0.6]), sites, np.tile(np.eye(4), (2, 1, 1)), steps=frozenset({1}))
+    sensor = models.SensorModel(
+        models.position(),
+        models.constant_noise([3.0, 3.0]),
+        models.constant_detection(0.1),
+        models.region_clutter(1.0, models.Region(-1e3, 1e3, -1e3, 1e3), "position"),
+    )
+    tracker = LmbFilter(models.TargetModel(motion, models.constant_survival(1.0), birth), sensor)
+    belief, rng, none = tracker.initial(), np.random.default_rng(0), np.empty((0, 2))
+    for step, wanted in ((1, [0.0, 0.0]), (2, [0.25, 0.75])):  # drawn at the first prediction
+        belief, _ = tracker.step(belief, none, np.zeros(3), 1.0, step, rng=rng)
+        found = belief_arrays(belief, step, 3, 2)["mode_probs"]
+        np.testing.assert_allclose(found, [wanted, wanted, [0.0, 0.0]], atol=1e-4)
+    assert "mode_probs" not in belief_arrays(belief, 2, 3)
+
+
+@pytest.mark.parametrize("name", ["paper-a", "six-cameras", "one moves", "modes"])
 def test_the_page_has_the_layout(name: str) -> None:
     """Names, shapes and types of the table of docs/gym-observations.md, in its order."""
     env = ScenarioEnv(scene(name))
     env.reset(seed=1)
     layout, (num_sensors, pose_dim) = env.episodes.layout, env.world.experiment.poses.shape
-    sizes = {"L": 10, "d": env.world.truth.states.shape[1], "S": num_sensors, "p": pose_dim, "2": 2}
+    sizes = {"L": 10, "d": env.world.truth.states.shape[1], "S": num_sensors, "p": pose_dim, "2": 2, "M": 3}
     sizes |= {"D": len(layout.deciding), "A": max(layout.num_actions)}
     sizes["U"] = math.prod(layout.shapes.get("undetected", ()))
     page = (Path(__file__).parents[2] / "docs/gym-observations.md").read_text("utf-8")
-    rows = re.findall(r"^\| `(\w+)` \| ([LdSpDAU2, ]+) \| (float32|int8) \|", page, re.MULTILINE)
+    rows = re.findall(r"^\| `(\w+)` \| ([LdSpDAUM2, ]+) \| (float32|int8) \|", page, re.MULTILINE)
     told = {name: (tuple(sizes[own] for own in shape.split(", ")), kind) for name, shape, kind in rows}
     spaces = dict(env.observation_space.items())  # type: ignore[attr-defined]
-    if "undetected" not in spaces:
-        del told["undetected"]
+    for optional in {"undetected", "mode_probs"} - spaces.keys():
+        del told[optional]
     assert told == {name: (own.shape, str(own.dtype)) for name, own in spaces.items()}
 
 

@@ -11,6 +11,7 @@ from vedette.campaigns.results import CampaignResults, open_results
 from vedette.campaigns.spec import spec_from_data
 from vedette.campaigns.store import Store
 from vedette.campaigns.tasks import CompletedRun, Task, perform
+from vedette.scenarios import load_scenario
 
 
 def campaign_of(**fields: Any) -> Campaign:
@@ -51,4 +52,18 @@ MIXED_SENSORS: dict[str, Any] = {
     "sensors.1.noise": {"kind": "constant", "std": [10.0]},
     "sensors.1.clutter": {"kind": "measurement_space", "rate": 4.0, "low": [0.0], "high": [2000.0]},
     "sensors.1.detection": {"kind": "limited_range", "probability": 0.95, "max_range": 1200.0},
+}
+
+# One sensor, and targets that turn at times.
+MODES: dict[str, Any] = {
+    **SUMS,
+    "fusion": {"kind": "none"},
+    "sensors": load_scenario("paper-a").model.model_dump(mode="json")["sensors"][:1],
+    "motion": {
+        "kind": "modes",
+        "modes": {
+            "cruise": {"motion": {"kind": "constant_velocity", "sigma_v": 1.0}, "stay_s": 20.0},
+            "turn": {"motion": {"kind": "constant_turn", "turn_rate_deg": 15.0, "sigma_v": 1.0}, "stay_s": 8.0},
+        },
+    },
 }

@@ -11,7 +11,7 @@ import pytest
 
 from evaluation.still_network import NAMES, STILL_NETWORK
 from reports.browser import Browser, Page, chromium
-from reports.examples import MIXED_SENSORS, SUMS, campaign_of, results_of
+from reports.examples import MIXED_SENSORS, MODES, SUMS, campaign_of, results_of
 from vedette.reports import write_report
 from waiting import PATIENCE
 
@@ -244,6 +244,29 @@ def test_bearings_ranges_and_positions_are_drawn(browser: Browser, tmp_path: Pat
     page.click("[data-show=trails]")
     kinds = page.evaluate("JSON.parse(document.getElementById('runs').textContent)[0].sensors.map((s) => s.kind)")
     assert kinds == ["ray", "circle"]
+
+
+def test_modes_have_colours_and_a_legend(browser: Browser, tmp_path: Path) -> None:
+    write_report(
+        results_of(tmp_path / "results", campaign_of(planners=["stationary"], set=MODES, runs=1)),
+        tmp_path / "report.html",
+    )
+    page = browser.open(tmp_path / "report.html")
+    choose(page, "scrubber", "12")
+    assert text(page, "modes-key").split() == ["in", "mode", "cruise", "in", "mode", "turn"]
+    legend = "document.querySelector('[data-part=modes-key]').hidden"
+    before = page.evaluate("document.querySelector('[data-part=scene]').toDataURL()")
+    assert not page.evaluate(legend)
+    page.click(".menu summary")
+    page.click("[data-show=modes]")
+    assert page.evaluate(legend)
+    assert page.evaluate("document.querySelector('[data-part=scene]').toDataURL()") != before
+    assert page.complaints() == []
+
+
+def test_no_legend_of_modes_without_modes(page: Page) -> None:
+    assert text(page, "modes-key") == ""
+    assert page.evaluate("document.querySelector('[data-part=modes]').hidden")
 
 
 def test_pointing_at_a_reward_shows_its_actions_and_value(page: Page) -> None:

@@ -12,7 +12,7 @@ import pytest
 
 from evaluation.still_network import NAMES, POLYGON, STILL_NETWORK
 from evaluation.synthetic import make_record
-from reports.examples import MIXED_SENSORS, SUMS, campaign_of, results_of
+from reports.examples import MIXED_SENSORS, MODES, SUMS, campaign_of, results_of
 from simulation.test_explanation_tables import explanation_of
 from vedette.control import TargetGains
 from vedette.errors import InputError
@@ -88,6 +88,19 @@ def test_bearings_and_ranges_alone_stay_what_they_are(tmp_path: Path) -> None:
     ranges = [row[1] for row in data["scans"][7][1]]
     np.testing.assert_allclose(bearings, scans[7][0].measurements[:, 0], atol=1e-4)
     np.testing.assert_allclose(ranges, scans[7][1].measurements[:, 0], atol=0.06)
+
+
+def test_estimates_have_the_number_of_their_mode(tmp_path: Path) -> None:
+    strategy = strategies_of(tmp_path / "results", planners=["stationary"], set=MODES)["stationary"]
+    record = strategy.record(0)
+    data = replay_data(strategy, record, "", trust=True)
+    json.dumps(data, allow_nan=False)
+    assert list(data["mode_names"]) == ["cruise", "turn"]
+    for numbers, likeliest, estimate in zip(data["modes"], data["classes"], record.estimates, strict=True):
+        assert len(numbers) == len(estimate.labels)
+        for number, (name, _) in zip(numbers, likeliest, strict=True):
+            assert name == ("cruise", "turn", "new")[number]
+    assert any(0 in numbers for numbers in data["modes"])
 
 
 def test_a_joint_decision_is_a_map_and_curves_with_the_choice(strategies: Mapping[str, Strategy]) -> None:

@@ -68,6 +68,22 @@ def test_no_built_in_scenario_warns(name: str) -> None:
     assert scenario_warnings(load_scenario(name)) == ()
 
 
+def with_stay(stay: float) -> dict[str, Any]:
+    """A motion with two modes, one of which targets leave after some seconds."""
+    cruise, turn = ({"motion": {"kind": "constant_velocity"}, "stay_s": own} for own in (40.0, stay))
+    return {"motion": {"kind": "modes", "modes": {"cruise": cruise, "turn": turn}}}
+
+
+@pytest.mark.parametrize(("stay", "period", "steps"), [(0.5, 10.0, 80), (0.3, 1.0, 14), (0.4, 1.0, 0), (8.0, 1.0, 0)])
+def test_a_stay_far_shorter_than_the_time_between_scans_warns_with_the_steps(stay, period, steps) -> None:
+    fields = {**with_stay(stay), "time.step_period": period}
+    found = [line for line in scenario_warnings(replace_fields(load_scenario("paper-a"), fields)) if "stay_s" in line]
+    assert len(found) == (steps > 0)
+    if steps:
+        assert f"motion.modes.turn.stay_s: {stay:g} s is short for scans {period:g} s apart" in found[0]
+        assert f"into {steps} steps" in found[0]
+
+
 def test_births_at_every_step_warn_under_covariance_intersection_alone() -> None:
     (line,) = scenario_warnings(replace_fields(load_scenario("solent"), {"fusion": {"kind": "cm_delta_glmb"}}))
     assert "warning: births at every step without feedback" in line

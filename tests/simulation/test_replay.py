@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 from typing import Any
 
@@ -8,9 +9,9 @@ import pytest
 
 from vedette.errors import InputError
 from vedette.evaluation.runs import run_scenario
-from vedette.scenarios import load_scenario
+from vedette.scenarios import Scenario, list_builtin, load_scenario, parse_scenario
 from vedette.scenarios.build import build_experiment
-from vedette.simulation import CLUTTER, Scan, loop, simulate_scans
+from vedette.simulation import CLUTTER, Scan, load_run, loop, save_run, simulate_scans
 from vedette.simulation.replay import scans_of
 
 
@@ -35,6 +36,34 @@ def test_the_scans_drawn_again_are_those_that_the_loop_simulated(monkeypatch: py
             np.testing.assert_array_equal(scan.measurements, before.measurements)
             places = np.where(before.origins == CLUTTER, 0, before.origins)  # the loop names targets by their place
             np.testing.assert_array_equal(scan.origins, np.where(before.origins == CLUTTER, CLUTTER, ids[places]))
+
+
+HIDING = """motion:
+  kind: modes
+  modes:
+    seen: {motion: {kind: constant_velocity, sigma_v: 0.5}, stay_s: 10.0}
+    hidden: {motion: {kind: constant_velocity, sigma_v: 0.5}, stay_s: 10.0, detection_factor: 0.0}
+"""
+
+
+def test_hidden_targets_are_in_no_scan_of_a_record_that_was_saved(tmp_path):
+    text = list_builtin()["paper-a"].read_text("utf-8")
+    text = re.sub(r"(- \{state: \[[^\]]*\])\}", r"\1, process_noise: true}", text)
+    scenario = Scenario(parse_scenario(re.sub(r"motion:\n(?:  .*\n)+", HIDING, text, count=1)))
+    record = run_scenario(scenario, "stationary", seed=3)
+    save_run(record, tmp_path / "run")
+    loaded = load_run(tmp_path / "run")
+    np.testing.assert_array_equal(loaded.truth.detection_factors, record.truth.detection_factors)
+    num_hidden = num_detected = 0
+    again: Any = scans_of(loaded, build_experiment(scenario))
+    for step, scans in enumerate(again):
+        hidden = record.truth.at(step)[0][record.truth.detection_factors_at(step) == 0.0]
+        num_hidden += len(hidden)
+        for scan in scans:
+            assert not np.isin(scan.origins, hidden).any()
+            num_detected += int(np.count_nonzero(scan.origins != CLUTTER))
+    assert num_hidden > 20
+    assert num_detected > 50
 
 
 def test_a_record_of_other_sensors_is_refused() -> None:

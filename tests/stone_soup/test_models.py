@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from scipy.linalg import expm
 from scipy.stats import multivariate_normal
 
 pytest.importorskip("stonesoup")
@@ -40,6 +41,7 @@ from stonesoup.types.state import GaussianState, State, StateVector, WeightedGau
 from vedette.errors import InputError
 from vedette.models import (
     BirthModel,
+    Modes,
     SensorModel,
     bearing_slant_range,
     constant_detection,
@@ -54,6 +56,7 @@ from vedette.stonesoup import (
     convert_clutter,
     convert_detection,
     convert_measurement,
+    convert_modes,
     convert_motion,
     convert_noise,
     convert_pose,
@@ -70,6 +73,9 @@ MOTIONS = {
     "third derivative": CombinedLinearGaussianTransitionModel(
         [ConstantNthDerivative(constant_derivative=3, noise_diff_coeff=q) for q in (0.2, 0.4)]
     ),
+    "one acceleration": CombinedLinearGaussianTransitionModel([ConstantAcceleration(0.3)] * 2),
+    "one walk": CombinedLinearGaussianTransitionModel([RandomWalk(0.3)] * 2),
+    "one known turn": KnownTurnRate(np.array([0.2, 0.2]), math.radians(-7.0)),
     "turn": ConstantTurn(np.array([0.2, 0.4]), 0.01),
     "known turn": KnownTurnRate(np.array([0.2, 0.4]), math.radians(7.0)),
 }
@@ -115,6 +121,57 @@ def test_where_a_state_has_what() -> None:
     there = layout.states([[1.0, 2.0, 3.0, 4.0, 5.0, 6.0]])
     assert there.tolist() == [[1.0, 4.0, 2.0, 5.0, 3.0, 6.0]]
     assert layout.inverse().states(there).tolist() == [[1.0, 2.0, 3.0, 4.0, 5.0, 6.0]]
+
+
+CRUISE = CombinedLinearGaussianTransitionModel([ConstantVelocity(0.04)] * 2)
+LEFT, RIGHT = (KnownTurnRate(np.array([0.5, 0.5]), math.radians(rate)) for rate in (9.0, -9.0))
+
+
+def test_models_with_times_in_each_are_modes() -> None:
+    modes, layout = convert_modes([CRUISE, LEFT], stay_s=[40.0, 8.0], names=("cruise", "left"), at_birth=[0.9, 0.1])
+    assert isinstance(modes, Modes)
+    assert (modes.names, layout) == (("cruise", "left"), PLANE)
+    np.testing.assert_allclose(modes.rates, [[-1.0 / 40.0, 1.0 / 40.0], [1.0 / 8.0, -1.0 / 8.0]])
+    vector, interval = np.array([5.0, 3.0, -7.0, 2.0]), datetime.timedelta(seconds=2.5)
+    for motion, model in zip(modes.in_common, (CRUISE, LEFT), strict=True):
+        theirs = np.asarray(model.function(State(StateVector(vector)), time_interval=interval), float).ravel()
+        np.testing.assert_allclose(motion.propagate(layout.states([vector]), 2.5), layout.states([theirs]), rtol=1e-12)
+        cov = layout.covs([np.asarray(model.covar(time_interval=interval), float)])[0]
+        np.testing.assert_allclose(motion.noise_cov(layout.states([vector])[0], 2.5), cov, rtol=1e-10, atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    "matrix",
+    [
+        [[0.95, 0.03, 0.02], [0.1, 0.88, 0.02], [0.06, 0.04, 0.9]],
+        [[1.0, 0.0, 0.0], [0.1, 0.9, 0.0], [0.2, 0.0, 0.8]],
+        np.eye(3),
+    ],
+)
+def test_a_transition_matrix_is_that_of_the_modes_after_its_interval(matrix: Any) -> None:
+    modes, _ = convert_modes([CRUISE, LEFT, RIGHT], transition_matrix=matrix, interval_s=2.0)
+    np.testing.assert_allclose(expm(2.0 * modes.rates), matrix, rtol=0, atol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("models", "given", "message"),
+    [
+        ([CRUISE, LEFT], {}, "stay_s, transition_matrix: expected one of the two; got neither"),
+        ([CRUISE, LEFT], {"transition_matrix": [[0.9, 0.2], [0.1, 0.9]]}, "transition_matrix: expected rows"),
+        ([CRUISE, LEFT], {"transition_matrix": [[0.4, 0.6], [0.1, 0.9]]}, "transition_matrix: .*above 0.5"),
+        (
+            [CRUISE, LEFT, RIGHT],
+            {"transition_matrix": [[0.9, 0.1, 0.0], [0.1, 0.8, 0.1], [0.0, 0.1, 0.9]]},
+            "transition_matrix: expected probabilities of a chain in continuous time, or stay_s and to instead",
+        ),
+        ([CRUISE, MOTIONS["acceleration"]], {"stay_s": [9.0, 9.0]}, r"transition_models\[0\]: expected states with"),
+        ([CRUISE, MOTIONS["known turn"]], {"stay_s": [9.0, 9.0]}, r"motions\[1\]: expected a built-in motion"),
+        ([CRUISE, ConstantVelocity(0.1)], {"stay_s": [9.0, 9.0]}, "transition_model: expected one of"),
+    ],
+)
+def test_modes_that_cannot_be_are_refused(models: Any, given: Any, message: str) -> None:
+    with pytest.raises(InputError, match=message):
+        convert_modes(models, **given)
 
 
 COV = np.array([[0.02**2, 0.05], [0.05, 15.0**2]])
@@ -272,8 +329,8 @@ def of_parts(**given: Any) -> Any:
         ),
         (
             {"transition_model": ConstantVelocity(0.1)},
-            "transition_model: expected one of CombinedLinearGaussianTransitionModel, ConstantTurn, KnownTurnRate; "
-            "got ConstantVelocity",
+            "transition_model: expected one of CombinedLinearGaussianTransitionModel, ConstantTurn, KnownTurnRate, "
+            "or a motion of Vedette with its StateLayout; got ConstantVelocity",
         ),
         ({"transition_model": KnownTurnRate(np.array([0.1, 0.1]), 0.0)}, "turn_rate: expected a rate other than 0"),
         ({"sensors": []}, "sensors: expected one or more; got none"),

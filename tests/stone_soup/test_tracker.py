@@ -21,6 +21,7 @@ from stonesoup.metricgenerator.ospametric import OSPAMetric
 from stonesoup.metricgenerator.tracktotruthmetrics import SIAPMetrics
 from stonesoup.models.measurement.linear import LinearGaussian
 from stonesoup.models.measurement.nonlinear import CartesianToBearingRange
+from stonesoup.models.transition.linear import KnownTurnRate
 from stonesoup.predictor.kalman import KalmanPredictor
 from stonesoup.types.detection import Detection, MissedDetection
 from stonesoup.types.prediction import GaussianStatePrediction
@@ -36,7 +37,7 @@ from vedette.filters import LmbFilter
 from vedette.fusion import ParallelUpdate
 from vedette.models import BirthModel, measurement_space_clutter
 from vedette.recorded import Conventions, RecordedSensor, parse_scans, table_of_detections
-from vedette.stonesoup import LabelledTracker, ScanConverter, convert, convert_truth
+from vedette.stonesoup import LabelledTracker, ScanConverter, convert, convert_modes, convert_truth
 from vedette.tracking import Distributed
 
 BOX = measurement_space_clutter(1e-6, [-1e4, -1e4], [1e4, 1e4])
@@ -83,6 +84,29 @@ def test_one_target_is_tracked_as_by_their_kalman_filter() -> None:
     assert track[0].hypothesis.prediction is None
     assert isinstance(track[-1], GaussianStateUpdate)
     assert isinstance(track[-1].hypothesis.prediction, GaussianStatePrediction)
+
+
+def test_a_track_has_the_probabilities_of_its_modes() -> None:
+    modes = convert_modes(
+        [MOTION, KnownTurnRate(np.array([2.0, 2.0]), math.radians(20.0))], stay_s=[40.0, 10.0], names=("cruise", "left")
+    )
+    scans, state = [], np.array([60.0, 8.0, -10.0, 0.0])
+    for k in range(30):
+        place = state[[0, 2]] + np.random.default_rng(k).normal(size=2)
+        now = START + k * SECOND
+        scans.append((now, {Detection(StateVector(place), timestamp=now, measurement_model=MEASUREMENT)}))
+        turn = math.radians(20.0) if k >= 15 else 0.0
+        vx, vy = state[1], state[3]
+        vx, vy = vx * math.cos(turn) - vy * math.sin(turn), vx * math.sin(turn) + vy * math.cos(turn)
+        state = np.array([state[0] + vx, vx, state[2] + vy, vy])
+    models = convert(modes, [MEASUREMENT], births=BORN, clutter=BOX, prob_detection=1.0, prob_survival=1.0)
+    turning = []
+    for _, (track,) in LabelledTracker(scans, models):
+        assert set(track.metadata["modes"]) == {"cruise", "left"}
+        turning.append(track.metadata["modes"]["left"])
+    assert turning[0] == 0.0  # not drawn yet
+    assert max(turning[5:15]) < 0.5
+    assert turning[-1] > 0.7
 
 
 @pytest.mark.parametrize("kind", ["lmb", "glmb"])

@@ -14,7 +14,7 @@ from vedette.densities.factored import FactoredGLMB, sets_of_factors
 from vedette.densities.glmb import GLMB
 from vedette.densities.label_sets import take_factors
 from vedette.densities.labelled import LMB, LabelledDensity
-from vedette.densities.tracks import TrackTable, single_gaussians, take_tracks
+from vedette.densities.tracks import DEFAULT_MERGE_DISTANCE, TrackTable, single_gaussians, take_tracks
 from vedette.errors import InputError
 from vedette.internal.probabilities import log_expit
 from vedette.kernels.association.label_resolution import resolved_labels
@@ -27,7 +27,6 @@ _Glmb = TypeVar("_Glmb", GLMB, FactoredGLMB)
 _Labelled = TypeVar("_Labelled", bound=LabelledDensity)
 
 DEFAULT_LOG_MIN_WEIGHT = math.log(1e-5)
-DEFAULT_MERGE_DISTANCE = 2.0
 
 # Targets further apart than this, in standard deviations of their difference, are distinct.
 _APART = 4.0

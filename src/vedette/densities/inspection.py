@@ -25,6 +25,7 @@ class Target(NamedTuple):
     existence: float  # existence probability
     mean: Floats  # (state_dim,) of its state, if it exists
     cov: Floats  # (state_dim, state_dim)
+    mode_probs: Floats  # (up to num_modes,) of each mode of motion; empty without modes and without labels
 
 
 class Hypothesis(NamedTuple):
@@ -43,12 +44,14 @@ class Targets(NamedTuple):
     weights: Floats  # (num,) probability of existence, or expected number
     means: Floats  # (num, state_dim)
     covs: Floats  # (num, state_dim, state_dim)
+    mode_probs: Floats | None = None  # (num, up to num_modes) of each mode of motion; None: no modes
     measurements: Ints | None = None  # (num,) likeliest measurement of the last scan, -1: missed; None: not known
 
     def each(self) -> Iterator[Target]:
         """Iterate over the targets."""
         labels = [None] * len(self.weights) if self.labels is None else map(tuple, self.labels.tolist())
-        return map(Target, labels, self.weights.tolist(), self.means, self.covs)
+        modes = np.empty((len(self.weights), 0)) if self.mode_probs is None else self.mode_probs
+        return map(Target, labels, self.weights.tolist(), self.means, self.covs, modes)
 
     def in_words(self) -> str:
         """Return the likeliest few in words: label, probability (or expected number), position and its std."""

@@ -12,7 +12,7 @@ import numpy as np
 from vedette.densities import checks
 from vedette.densities.containers import MultiTarget, for_kernel, unchecked
 from vedette.densities.inspection import Hypothesis, Target, Targets, indices_or_none
-from vedette.densities.tracks import TrackTable, merged_tracks, take_tracks
+from vedette.densities.tracks import TrackTable, merged_tracks, mode_probabilities, take_tracks
 from vedette.errors import InputError, NumericalError, VedetteError
 from vedette.internal.probabilities import expit
 from vedette.internal.text import pluralise
@@ -129,6 +129,9 @@ class LabelledDensity(MultiTarget):
         with np.errstate(divide="ignore"):
             versions = taken_components(merged._replace(log_weights=np.log(shares)), order)
         moments = merged_mixtures(versions, checks.offsets_of(counts))
+        of_tracks = shares[:, np.newaxis] * mode_probabilities(self.tracks)
+        modes = np.zeros((len(table), of_tracks.shape[1]))
+        np.add.at(modes, place, of_tracks)
         _, row = checks.distinct_labels(np.concatenate([table, labels]))  # the table may contain unused labels
         own = row[len(table) :]
         taken = self.tracks.measurements
@@ -136,7 +139,7 @@ class LabelledDensity(MultiTarget):
             chances = np.zeros((len(table), taken.max() + 2))  # per label: missed, then by measurement
             np.add.at(chances, (place, taken + 1), weights)
             taken = chances.argmax(axis=1)[own] - 1
-        return Targets(labels, existence, moments.means[own], moments.covs[own], taken)
+        return Targets(labels, existence, moments.means[own], moments.covs[own], modes[own], taken)
 
     def _parts(self) -> str:
         """Return the part of the summary after the labels."""

@@ -23,7 +23,8 @@ from vedette.kernels.gaussian.pooling import merged_mixtures, reduced_tracks
 from vedette.kernels.gaussian.reduction import MixtureCaps
 
 UNSCANNED = -2  # replaces a measurement index
-OF_ANY_MODE = MixtureCaps(-math.inf, 2.0, 2**62)  # for components of different modes
+DEFAULT_MERGE_DISTANCE = 2.0
+OF_ANY_MODE = MixtureCaps(-math.inf, DEFAULT_MERGE_DISTANCE, 2**62)  # for components of different modes
 _ARRAYS = kernel_arrays("labels", "offsets", *kt.Mixture._fields)
 
 

@@ -11,7 +11,7 @@ from scipy.sparse.csgraph import connected_components
 
 from vedette.densities import Estimate
 from vedette.kernels.base.types import Bools, Floats, Ints
-from vedette.kernels.gaussian.modes import mode_probabilities
+from vedette.kernels.gaussian.modes import mode_transitions
 from vedette.models.measurement import wrap_periodic
 from vedette.models.modes import Modes
 from vedette.models.motion import MotionModel
@@ -165,7 +165,7 @@ def _predicted(before: Instant, now: Instant, motion: MotionModel) -> tuple[Ints
     probs = estimate.mode_probs[kept]
     known = np.pad(probs, ((0, 0), (0, len(motion.names) - probs.shape[1])))
     known = known + (1.0 - known.sum(axis=1, keepdims=True)) * motion.at_birth  # new targets have no mode yet
-    shares = known @ mode_probabilities(motion.rates, dt)
+    shares = known @ mode_transitions(motion.rates, dt)
     ends, spreads = map(np.array, zip(*(_moved(own, means, covs, dt) for own in motion.in_common), strict=True))
     moved = np.einsum("im,mid->id", shares, ends)
     apart = ends - moved

@@ -59,6 +59,11 @@ class ObservationEncoder(Checked):
     schedule: Schedule
     num_labels: Count = 10
 
+    @property
+    def num_modes(self) -> int:
+        """Number of modes of motion, or 0 without modes."""
+        return len(getattr(self.sensors[0].filter.targets.motion, "names", ()))
+
     @classmethod
     def of(cls, parts: Mapping[str, Any], num_labels: int = 10) -> ObservationEncoder:
         """Return the encoder for the parts of a scenario's planner (`vedette.scenarios.build.build_parts`)."""
@@ -106,7 +111,7 @@ class ObservationEncoder(Checked):
             own, num = options[s], len(options[s].actions)
             masks[row, :num] = single_mask(mask, s, len(own.courses))[own.which]
             ends[row, :num] = own.courses[own.which, -1]
-        found = belief_arrays(state.fused, state.step, self.num_labels)
+        found = belief_arrays(state.fused, state.step, self.num_labels, self.num_modes)
         found |= {"poses": poses.astype(np.float32), "time": self._times(state.step)}
         found |= {"ends": ends, "action_mask": masks}
         if state.undetected is not None:
@@ -128,11 +133,12 @@ def deciding_sensors(options: tuple[Options, ...]) -> tuple[int, ...]:
     return found
 
 
-def belief_arrays(belief: Any, step: int, num_labels: int) -> Observation:
+def belief_arrays(belief: Any, step: int, num_labels: int, num_modes: int = 0) -> Observation:
     """Return the most probable targets, in descending order, as arrays of `num_labels` rows. Unused rows are 0.
 
     Mean and covariance are those of a label's marginal density. For a belief without labels, the targets are the
-    estimated ones.
+    estimated ones. With modes of motion, also the probability of each mode of each target, or 0 for a belief without
+    labels.
     """
     rows = list((belief if isinstance(belief, LabelledDensity) else best_estimate(belief, step)).targets())
     rows = [rows[i] for i in np.argsort([-row.existence for row in rows], kind="stable")[:num_labels]]
@@ -144,4 +150,9 @@ def belief_arrays(belief: Any, step: int, num_labels: int) -> Observation:
         existence[:num], mask[:num] = [row.existence for row in rows], 1
         means[:num] = [row.mean for row in rows]
         roots[:num] = np.linalg.cholesky(np.array([row.cov for row in rows]))
-    return {"existence": existence, "means": means, "sqrt_covs": roots, "mask": mask}
+    found: Observation = {"existence": existence, "means": means, "sqrt_covs": roots, "mask": mask}
+    if num_modes:
+        found["mode_probs"] = np.zeros((num_labels, num_modes), np.float32)
+        for i, row in enumerate(rows):
+            found["mode_probs"][i, : len(row.mode_probs)] = row.mode_probs
+    return found

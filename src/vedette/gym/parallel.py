@@ -96,7 +96,8 @@ class ScenarioParallelEnv(OfEpisodes, ParallelEnv):  # type: ignore[misc]  # Pet
             own = {name: shown[name][row, :num] for name in ("ends", "action_mask")}
             own["poses"] = np.concatenate([poses[s : s + 1], poses[:s], poses[s + 1 :]])
             if self._own:
-                own |= belief_arrays(context.state.local[s], context.state.step, self._num_labels)
+                num_modes = self.episodes.built.encoder.num_modes
+                own |= belief_arrays(context.state.local[s], context.state.step, self._num_labels, num_modes)
             found[agent] = {name: array.copy() for name, array in (shown | own).items()}
         return found
 

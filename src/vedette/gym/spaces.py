@@ -9,7 +9,7 @@ import numpy as np
 from gymnasium import spaces
 from numpy.typing import NDArray
 
-_FLAGS, _NOT_NEGATIVE = ("mask", "action_mask"), ("existence", "time", "undetected")
+_FLAGS, _PROBABILITIES, _NOT_NEGATIVE = ("mask", "action_mask"), ("existence", "mode_probs"), ("time", "undetected")
 _LARGEST = float(np.finfo(np.float32).max)  # Gymnasium's checks treat infinite bounds as missing
 
 
@@ -21,5 +21,6 @@ def space_of(shapes: Mapping[str, tuple[int, ...]]) -> spaces.Dict[NDArray[Any]]
 def _array(name: str, shape: tuple[int, ...]) -> spaces.Space[Any]:
     if name in _FLAGS:
         return spaces.MultiBinary(shape)
-    low, high = 0.0 if name in _NOT_NEGATIVE else -_LARGEST, 1.0 if name == "existence" else _LARGEST
+    low = 0.0 if name in (*_PROBABILITIES, *_NOT_NEGATIVE) else -_LARGEST
+    high = 1.0 if name in _PROBABILITIES else _LARGEST
     return spaces.Box(low, high, shape, np.float32)

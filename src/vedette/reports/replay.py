@@ -66,6 +66,7 @@ def replay_data(strategy: Strategy, record: RunRecord, group: str, *, trust: boo
         "estimates": _estimates(record, scenario, decimals),
         **({"heights": _heights(record, components)} if HEIGHT in components else {}),
         **({"classes": _likeliest(record, scenario)} if scenario.model.classes or scenario.model.mode_names else {}),
+        **({"modes": _mode_numbers(record), "mode_names": names} if (names := scenario.model.mode_names) else {}),
         "poses": [
             [pose_data(pose, section, decimals) for pose, section in zip(poses, sections, strict=True)]
             for poses in record.poses
@@ -196,6 +197,12 @@ def _likeliest(record: RunRecord, scenario: Scenario) -> list[list[list[Any]]]:
         [[names[probs.argmax()], round(float(probs.max()), 3)] if probs.any() else ["new", 1.0] for probs in each]
         for each in (getattr(estimate, field) for estimate in record.estimates)
     ]
+
+
+def _mode_numbers(record: RunRecord) -> list[list[int]]:
+    """Return for each estimate of each scan the number of its most probable mode of motion, -1 if not drawn yet."""
+    probs = (estimate.mode_probs for estimate in record.estimates)
+    return [[int(own.argmax()) if own.any() else -1 for own in each] for each in probs]
 
 
 def height_data(estimate: Estimate, place: int) -> list[list[float]]:

@@ -9,7 +9,7 @@ from itertools import combinations
 import numpy as np
 
 from vedette.internal.cut_births import MAX_CUT_SHARE, cut_share
-from vedette.kernels.base.types import Bools, Floats
+from vedette.kernels.base.types import LONGEST_MODE_STEP, Bools, Floats
 from vedette.scenarios.coastline import coastline_warnings
 from vedette.scenarios.coverage_warnings import coverage_warnings
 from vedette.scenarios.diagnostics import Diagnostic, Path
@@ -45,6 +45,7 @@ _POINTS_PER_SIDE = 21
 # Expected number of targets at a site that earlier scans have not detected, relative to one. Above it, Poisson
 # births had 2 to 36 % less OSPA in an LMB filter at 14 settings of one site (P_D .4 and .7), below it 0 to 9 % at 8.
 MAX_MISSED = 0.02
+_MAX_MODE_STEPS = 10  # between two scans, above which a stay is far shorter than the time between them
 _MAX_WORTH = 20.0  # largest plausible worth of an undetected target, in costs of a missed one
 
 
@@ -67,7 +68,7 @@ def scenario_warnings(scenario: Scenario, more: Iterable[tuple[Path, str]] = ())
     ]
     warnings += coverage_warnings(scenario.model)
     warnings += [*_undetected_births(scenario.model), *_missed_targets(scenario)]
-    warnings += [*start_warnings(scenario), *new_target_warnings(scenario)]
+    warnings += [*start_warnings(scenario), *new_target_warnings(scenario), *_many_mode_steps(scenario)]
     warnings += [*implausible_settings(scenario.model), *coastline_warnings(scenario.model, scenario.folder), *more]
     if not warnings:
         return ()
@@ -85,6 +86,26 @@ def _recording_warnings(scenario: Scenario) -> Iterator[tuple[Path, str]]:
         from vedette.scenarios.recording_warnings import recording_warnings  # slow to import
 
         yield from recording_warnings(scenario)
+
+
+def _many_mode_steps(scenario: Scenario) -> Iterator[tuple[Path, str]]:
+    """Yield a warning if the shortest stay in a mode divides the usual time between scans into many steps."""
+    model, period = scenario.model, scenario.model.time.step_period
+    stays = {name: mode.stay_s or math.inf for name, mode in getattr(model.motion, "modes", {}).items()}
+    if stays and model.recording is not None:
+        from vedette.scenarios.recorded_data import recorded_scans  # slow to import
+
+        gaps = np.diff(recorded_scans(model, scenario.folder).times)
+        period = float(np.median(gaps)) if len(gaps) else 0.0
+    name = min(stays, key=stays.__getitem__, default="")
+    steps = math.ceil(period / (LONGEST_MODE_STEP * stays.get(name, math.inf)))
+    if steps > _MAX_MODE_STEPS:
+        yield (
+            ("motion", "modes", name, "stay_s"),
+            f"motion.modes.{name}.stay_s: {stays[name]:g} s is short for scans {period:.3g} s apart: filters divide "
+            f"the time between two scans into {steps} steps, each with a prediction of all modes. "
+            f"Above {period / (_MAX_MODE_STEPS * LONGEST_MODE_STEP):.3g} s there are at most {_MAX_MODE_STEPS}",
+        )
 
 
 def _fusion_by_label(model: ScenarioModel) -> Fusion | None:

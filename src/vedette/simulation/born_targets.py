@@ -11,7 +11,13 @@ from vedette.kernels.base.types import Floats
 from vedette.models import Modes, MotionModel, Region
 from vedette.models.arguments import float_array, generator
 from vedette.models.fields import NonNegative, Probability, check_fields
-from vedette.simulation.true_motion import first_mode, moved_states, moved_target, semidefinite_factor
+from vedette.simulation.true_motion import (
+    detection_factors_of,
+    first_mode,
+    moved_states,
+    moved_target,
+    semidefinite_factor,
+)
 from vedette.simulation.truth import Truth, scan_times
 
 
@@ -61,16 +67,16 @@ class PoissonTargets:
         noise = rng.standard_normal((len(births), len(self.mean)))
         starts = self.mean + noise @ semidefinite_factor(self.cov).T
         alive = np.zeros((len(births), len(scans)), np.bool_)
-        states = np.zeros((len(births), len(scans), len(self.mean)))
+        states, modes = np.zeros((*alive.shape, len(self.mean))), np.zeros(alive.shape, np.int64)
         for target, (birth, state) in enumerate(zip(births.tolist(), starts, strict=True)):
-            trajectory = self._life(state, scans[birth:], rng)
-            alive[target, birth : birth + len(trajectory)] = True
-            states[target, birth : birth + len(trajectory)] = trajectory
-        return Truth.from_arrays(scans, alive, states)
+            trajectory, taken = self._life(state, scans[birth:], rng)
+            life = slice(birth, birth + len(trajectory))
+            alive[target, life], states[target, life], modes[target, life] = True, trajectory, taken
+        return Truth.from_arrays(scans, alive, states, detection_factors_of(self.motion, modes))
 
-    def _life(self, state: Floats, times: Floats, rng: np.random.Generator) -> Floats:
-        """(num_scans of its life, state_dim) states of a target from its first scan."""
-        states: list[Floats] = []
+    def _life(self, state: Floats, times: Floats, rng: np.random.Generator) -> tuple[Floats, list[int]]:
+        """(num_scans of its life, state_dim) states of a target from its first scan, and its modes."""
+        states, modes = list[Floats](), list[int]()
         mode = first_mode(self.motion, rng) if isinstance(self.motion, Modes) else 0
         for scan in range(len(times)):
             if scan > 0:
@@ -85,4 +91,5 @@ class PoissonTargets:
             if self.region is not None and not self.region.contains(state[np.newaxis, :2])[0]:
                 break
             states.append(state)
-        return np.array(states).reshape(-1, len(state))
+            modes.append(mode)
+        return np.array(states).reshape(-1, len(state)), modes

@@ -76,15 +76,18 @@ def transition_jacobians(motion: MotionModel, states: Floats, dt: float) -> Floa
     return np.moveaxis((propagated[0] - propagated[1]) / (2.0 * _STEP), 0, -1)
 
 
-def scan_information(sensor: SensorModel, states: Floats, pose: Floats) -> Floats:
-    """(num, dim, dim) P_D H' R^-1 H of one scan of targets at (num, dim) states."""
+def scan_information(sensor: SensorModel, states: Floats, pose: Floats, factors: Floats | float = 1.0) -> Floats:
+    """(num, dim, dim) P_D H' R^-1 H of one scan of targets at (num, dim) states.
+
+    factors: (num,) factors on P_D, see `Truth.detection_factors_at`.
+    """
     num, dim = states.shape
     measured = sensor.measurement.measure(_shifted(states), pose).reshape(2, dim, num, sensor.meas_dim)
     change = (measured[0] - measured[1]).reshape(-1, sensor.meas_dim)
     change = wrap_periodic(change, sensor.measurement.periods).reshape(dim, num, sensor.meas_dim)
     jacobians = change.transpose(1, 2, 0) / (2.0 * _STEP)
     weights = np.linalg.inv(sensor.noise.covs(states, pose, sensor.meas_dim))
-    detection = sensor.detection.prob(states, pose)[:, np.newaxis, np.newaxis]
+    detection = (factors * sensor.detection.prob(states, pose))[:, np.newaxis, np.newaxis]
     return np.asarray(detection * (jacobians.swapaxes(1, 2) @ weights @ jacobians))
 
 

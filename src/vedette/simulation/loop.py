@@ -156,7 +156,9 @@ class SimulationRun:
         with clock.timing("scans"):
             ids, states = self.truth.at(step - 1)
             sensors = experiment.sensors_at(step, self._scans_at)
-            scans = active_scans(simulate_scans(states, poses, sensors, ids=ids, rngs=self._scan_rngs), off)
+            factors = self.truth.detection_factors_at(step - 1)
+            drawn = simulate_scans(states, poses, sensors, ids=ids, detection_factors=factors, rngs=self._scan_rngs)
+            scans = active_scans(drawn, off)
             measurements = tuple([None if scan is None else scan.measurements for scan in scans])
         tracked = self._tracker.step(step, measurements, poses, time, clock)
         self.outcome = ScanOutcome(step, time, poses, measurements, scans, off, *tracked)

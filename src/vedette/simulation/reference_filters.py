@@ -89,7 +89,7 @@ class OracleFilter(_Reference):
     ) -> tuple[Sequence[int], Floats, Floats]:
         if self.truth is None:
             raise InputError("truth: expected the targets of the run, as of with_truth(); got None")
-        ids, states = self.truth.at(step - 1)
+        (ids, states), factors = self.truth.at(step - 1), self.truth.detection_factors_at(step - 1)
         motion, dim = self.targets.motion, self.targets.state_dim
         if states.shape[1] != dim:
             raise InputError(f"truth: expected states of {dim} numbers, as of the filters; got {states.shape[1]}")
@@ -99,7 +99,7 @@ class OracleFilter(_Reference):
         informations = np.linalg.inv(moved @ covs @ moved.swapaxes(1, 2) + motion.noise_covs(states, dt))
         for sensor, scan, pose in zip(self.sensors, scans, poses, strict=True):
             if scan is not None:
-                informations = informations + scan_information(sensor, states, np.asarray(pose, np.float64))
+                informations = informations + scan_information(sensor, states, np.asarray(pose, float), factors)
         covs = np.linalg.inv(informations)
         covs = 0.5 * (covs + covs.swapaxes(1, 2))
         self._covs = dict(zip(ids.tolist(), covs, strict=True))

@@ -42,10 +42,10 @@ def scans_of_sensors(
     """Do the same as `scans_of`, given only the true sensors at each step."""
     if record.num_sensors != num_sensors:
         raise InputError(f"record: expected {num_sensors} sensors; got {record.num_sensors}")
-    streams = sensor_streams(record.seed, record.run, SCANS, num_sensors)
-    return tuple(
-        active_scans(
-            simulate_scans(states, record.poses[step], sensors_at(step + 1), ids=ids, rngs=streams), record.off[step]
-        )
-        for step, (ids, states) in enumerate(record.truth.at(scan) for scan in range(record.num_scans))
-    )
+    streams, truth = sensor_streams(record.seed, record.run, SCANS, num_sensors), record.truth
+    scans: list[tuple[Scan | None, ...]] = []
+    for step in range(record.num_scans):
+        (ids, states), factors, sensors = truth.at(step), truth.detection_factors_at(step), sensors_at(step + 1)
+        drawn = simulate_scans(states, record.poses[step], sensors, ids=ids, detection_factors=factors, rngs=streams)
+        scans.append(active_scans(drawn, record.off[step]))
+    return tuple(scans)

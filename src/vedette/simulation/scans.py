@@ -41,6 +41,7 @@ def simulate_scan(
     sensor: SensorModel | TrueSensor,
     *,
     ids: ArrayLike | None = None,
+    detection_factors: ArrayLike | None = None,
     rng: np.random.Generator,
 ) -> Scan:
     """Return detections of the targets, each with additive Gaussian noise, and clutter (paper section IV).
@@ -53,14 +54,16 @@ def simulate_scan(
         pose: (3 or more,) px, py, heading_rad, ... of the sensor.
         sensor: the sensor model of the filter, or a true sensor that differs from it.
         ids: (num_targets,) ids for `Scan.origins`. None: the row in `truth_states`.
+        detection_factors: (num_targets,) factor on the probability of detection of each, in [0, 1]. None: 1.
         rng: generator of all random numbers.
 
     Raises:
-        InputError: invalid states, pose or ids.
+        InputError: invalid states, pose, ids or factors.
         ModelError: a model function raised or returned an invalid value at a target's state.
     """
     states, pose = float_array("truth_states", truth_states, (None, None)), pose_vector("pose", pose)
-    return _drawn(states, _named(ids, len(states)), pose, sensor, generator(rng))
+    factors = _factors(detection_factors, len(states))
+    return _drawn(states, _named(ids, len(states)), factors, pose, sensor, generator(rng))
 
 
 def _named(ids: ArrayLike | None, num: int) -> Ints:
@@ -71,8 +74,21 @@ def _named(ids: ArrayLike | None, num: int) -> Ints:
     return names.astype(np.int64, copy=False)
 
 
+def _factors(given: ArrayLike | None, num: int) -> Floats:
+    """(num,) factors on the probabilities of detection."""
+    factors = float_array("detection_factors", np.ones(num) if given is None else given, (num,))
+    if (factors < 0.0).any() or (factors > 1.0).any():
+        raise reject("detection_factors", "numbers in [0, 1]", factors.tolist())
+    return factors
+
+
 def _drawn(
-    states: Floats, names: Ints, pose: Floats, sensor: SensorModel | TrueSensor, rng: np.random.Generator
+    states: Floats,
+    names: Ints,
+    factors: Floats,
+    pose: Floats,
+    sensor: SensorModel | TrueSensor,
+    rng: np.random.Generator,
 ) -> Scan:
     """Return one scan from checked arguments."""
     true = sensor if isinstance(sensor, TrueSensor) else TrueSensor(sensor)
@@ -80,7 +96,7 @@ def _drawn(
     uniforms = rng.random(num)
     states, true_pose = (states, pose) if true.bias is NO_BIAS else _shown(true, states, pose)
     measured = _noisy_measurements(model, states, true_pose, rng.standard_normal((num, model.meas_dim)))
-    detected = _seen(model, _detected_at(true, states, true_pose, measured), true_pose, uniforms)
+    detected = _seen(model, _detected_at(true, states, true_pose, measured), true_pose, factors, uniforms)
     clutter = model.clutter.sample(true_pose, model.measurement, state_dim=states.shape[1], rng=rng)
     order = rng.random(num + len(clutter)).argsort()
     if true.bias is not NO_BIAS:
@@ -95,6 +111,7 @@ def simulate_scans(
     sensors: Sequence[SensorModel | TrueSensor],
     *,
     ids: ArrayLike | None = None,
+    detection_factors: ArrayLike | None = None,
     rngs: Sequence[np.random.Generator],
 ) -> tuple[Scan, ...]:
     """Return one scan per sensor if all scan."""
@@ -107,6 +124,7 @@ def simulate_scans(
     sensors: Sequence[SensorModel | TrueSensor | None],
     *,
     ids: ArrayLike | None = None,
+    detection_factors: ArrayLike | None = None,
     rngs: Sequence[np.random.Generator],
 ) -> tuple[Scan | None, ...]:
     """Return one scan per sensor, None for those that do not scan."""
@@ -118,6 +136,7 @@ def simulate_scans(
     sensors: Sequence[SensorModel | TrueSensor | None],
     *,
     ids: ArrayLike | None = None,
+    detection_factors: ArrayLike | None = None,
     rngs: Sequence[np.random.Generator],
 ) -> tuple[Scan | None, ...]:
     """Return one scan per sensor, each with its own pose and random numbers. See `simulate_scan`.
@@ -125,12 +144,12 @@ def simulate_scans(
     A sensor that is None does not scan and draws nothing. Its entry is None.
     """
     states, stages, scans = float_array("truth_states", truth_states, (None, None)), StageTimer(), list[Scan | None]()
-    names = _named(ids, len(states))
+    names, factors = _named(ids, len(states)), _factors(detection_factors, len(states))
     for s, (pose, sensor, rng) in enumerate(zip(poses, sensors, rngs, strict=True)):
         with stages.timing("scans", s):
             drawn = None
             if sensor is not None:
-                drawn = _drawn(states, names, pose_vector("pose", pose), sensor, generator(rng))
+                drawn = _drawn(states, names, factors, pose_vector("pose", pose), sensor, generator(rng))
             scans.append(drawn)
     return tuple(scans)
 
@@ -173,8 +192,8 @@ def _detected_at(sensor: TrueSensor, states: Floats, pose: Floats, measured: Flo
     return measured_states
 
 
-def _seen(sensor: SensorModel, states: Floats, pose: Floats, uniforms: Floats) -> Bools:
-    chances = numbers_at(sensor.detection.function, states, pose, sensor.detection.params)
+def _seen(sensor: SensorModel, states: Floats, pose: Floats, factors: Floats, uniforms: Floats) -> Bools:
+    chances = factors * numbers_at(sensor.detection.function, states, pose, sensor.detection.params)
     detected, bad = seen_with(chances, uniforms)
     if bad >= 0:
         state, got = states[bad], chances[bad]

@@ -28,6 +28,7 @@ from vedette.simulation.undetected_tables import UNDETECTED, undetected_tables, 
 Tables: TypeAlias = dict[str, Columns]
 
 POSE_COLUMNS = ("x_m", "y_m", "heading_rad")
+FACTOR = "detection_factor"  # column of true targets with a mode in which they are detected less
 OFF = "off"  # column of runs in which an action switched a sensor off: 1 where it did
 
 _TIME = {"step": Kind.INTEGER, "time_s": Kind.NUMBER}
@@ -37,7 +38,7 @@ _COUNTS = {"num_targets": Kind.INTEGER, "num_estimates": Kind.INTEGER}
 # All of a run except the facts that identify it and its timings. Runs of recorded scans have no `DECISION_TABLES`.
 LAYOUTS: dict[str, Layout] = {
     "scans": Layout({**_TIME, **_COUNTS, **dict.fromkeys(OSPA_COLUMNS, Kind.NUMBER), **FUSION_COLUMNS}),
-    "truth": Layout({**_TIME, "target": Kind.INTEGER}, {"state_": Kind.NUMBER}),
+    "truth": Layout({**_TIME, "target": Kind.INTEGER}, {"state_": Kind.NUMBER, FACTOR: Kind.NUMBER}),
     "tracks": Layout(
         {**_TIME, **_LABEL, "existence": Kind.NUMBER}, dict.fromkeys(("mean_", "cov_", "class_", "mode_"), Kind.NUMBER)
     ),
@@ -110,7 +111,11 @@ def record_of(
         run=summary.run,
         times=times,
         truth=Truth(
-            times, _offsets(tables["truth"], len(times)), tables["truth"]["target"], _matrix(tables["truth"], "state_")
+            times,
+            _offsets(tables["truth"], len(times)),
+            tables["truth"]["target"],
+            _matrix(tables["truth"], "state_"),
+            tables["truth"].get(FACTOR),
         ),
         poses=poses,
         off=np.reshape(off == 1, poses.shape[:2]),
@@ -169,7 +174,13 @@ def _poses_of(tables: Mapping[str, Mapping[str, Any]]) -> Floats:
 def _truth(record: RunRecord) -> Columns:
     truth = record.truth
     scans = truth.scans
-    return {"step": scans + 1, "time_s": record.times[scans], "target": truth.ids, **_columns("state_", truth.states)}
+    return {
+        "step": scans + 1,
+        "time_s": record.times[scans],
+        "target": truth.ids,
+        **_columns("state_", truth.states),
+        **({} if truth.detection_factors is None else {FACTOR: truth.detection_factors}),
+    }
 
 
 def _tracks(record: RunRecord) -> Columns:

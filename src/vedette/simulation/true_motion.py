@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from vedette.errors import InputError, ModelError
-from vedette.kernels.base.types import Bools, Floats
+from vedette.kernels.base.types import Bools, Floats, Ints
 from vedette.models import Modes, MotionModel
 
 # A pivot below this share of its variance is rounding: that direction has no noise of its own.
@@ -34,19 +34,29 @@ def moved_target(modes: Modes, state: Floats, mode: int, dt: float, rng: np.rand
         mode = int(rng.choice(len(following), p=following))
 
 
-def manoeuvring_target(modes: Modes, state: Floats, elapsed: Floats, rng: np.random.Generator | None) -> Floats:
-    """Return the states of a target at each scan, (num_scans, state_dim).
+def detection_factors_of(motion: MotionModel, modes: Ints | Floats) -> Floats | None:
+    """Return the factor of each mode on the probability of detection, or None if the motion has none below 1."""
+    if not isinstance(motion, Modes) or motion.detection_factors.min() == 1.0:
+        return None
+    return motion.detection_factors[modes.astype(np.int64)]
+
+
+def manoeuvring_target(
+    modes: Modes, state: Floats, elapsed: Floats, rng: np.random.Generator | None
+) -> tuple[Floats, Ints]:
+    """Return the states of a target at each scan, (num_scans, state_dim), and its modes then, (num_scans,).
 
     elapsed: s since the previous scan, or 0. rng: None for the first mode without noise.
     """
     mode, states = 0 if rng is None else first_mode(modes, rng), np.empty((len(elapsed), len(state)))
+    taken = np.empty(len(elapsed), np.int64)
     for scan, dt in enumerate(elapsed.tolist()):
         if rng is None:
             state = modes.in_common[0].propagate(state, dt)[0] if dt > 0.0 else state
         elif dt > 0.0:
             state, mode = moved_target(modes, state, mode, dt, rng)
-        states[scan] = state
-    return states
+        states[scan], taken[scan] = state, mode
+    return states, taken
 
 
 def moved_states(motion: MotionModel, states: Floats, dt: float, normals: Floats, noisy: Bools) -> Floats:

@@ -13,7 +13,7 @@ from vedette.internal.representation import SummaryRepr
 from vedette.kernels.base.types import Bools, Floats, Ints
 from vedette.models import Modes, MotionModel
 from vedette.models.arguments import float_array, generator, reject
-from vedette.simulation.true_motion import manoeuvring_target, moved_states
+from vedette.simulation.true_motion import detection_factors_of, manoeuvring_target, moved_states
 
 # s. Start times and scan times come from different sums; they count as equal within this tolerance.
 TIME_TOLERANCE = 1e-9
@@ -28,12 +28,14 @@ class Truth(SummaryRepr):
         offsets: (num_scans + 1,) targets of scan `k` are the rows `offsets[k]:offsets[k + 1]`.
         ids: (total,) id of the target, at least 0, at most once per scan.
         states: (total, state_dim) state of the target, position first.
+        detection_factors: (total,) factor of the target's mode on its probability of detection. None: all 1.
     """
 
     times: Floats
     offsets: Ints
     ids: Ints
     states: Floats
+    detection_factors: Floats | None = None
 
     @property
     def num_scans(self) -> int:
@@ -52,6 +54,11 @@ class Truth(SummaryRepr):
         rows = slice(self.offsets[scan], self.offsets[scan + 1])
         return self.ids[rows], self.states[rows]
 
+    def detection_factors_at(self, scan: int) -> Floats:
+        """(n,) factors on the probabilities of detection of the targets of `at`."""
+        first, end = self.offsets[scan : scan + 2].tolist()
+        return np.ones(end - first) if self.detection_factors is None else self.detection_factors[first:end]
+
     def first(self, num_scans: int) -> Truth:
         """Return the truth of the first scans."""
         return self.between(0, num_scans)
@@ -60,7 +67,8 @@ class Truth(SummaryRepr):
         """Return the truth of the scans from `first`, counted from 0, to the one before `end`."""
         rows = slice(self.offsets[first], self.offsets[end])
         offsets = self.offsets[first : end + 1] - self.offsets[first]
-        return Truth(self.times[first:end], offsets, self.ids[rows], self.states[rows])
+        factors = None if self.detection_factors is None else self.detection_factors[rows]
+        return Truth(self.times[first:end], offsets, self.ids[rows], self.states[rows], factors)
 
     def validate(self) -> None:
         """Raise `InputError` unless the arrays fit together as described above."""
@@ -79,14 +87,15 @@ class Truth(SummaryRepr):
             raise reject("Truth.ids", f"each id once in scan {scan}", self.at(scan)[0])
 
     @classmethod
-    def from_arrays(cls, times: Floats, alive: Bools, states: Floats) -> Truth:
+    def from_arrays(cls, times: Floats, alive: Bools, states: Floats, detection_factors: Floats | None = None) -> Truth:
         """Return the truth for (num_targets, num_scans) flags and (num_targets, num_scans, state_dim) states.
 
-        Row i is target i.
+        Row i is target i. detection_factors: (num_targets, num_scans), or None as in `Truth`.
         """
         scans, targets = np.nonzero(alive.T)
         offsets = np.concatenate([[0], np.cumsum(alive.sum(axis=0))]).astype(np.int64)
-        return cls(times, offsets, targets.astype(np.int64), np.ascontiguousarray(states[targets, scans]))
+        factors = None if detection_factors is None else detection_factors[targets, scans]
+        return cls(times, offsets, targets.astype(np.int64), np.ascontiguousarray(states[targets, scans]), factors)
 
 
 class TargetSource(Protocol):
@@ -172,9 +181,10 @@ class ScriptedTargets:
             first = first + self.initial_stds * rng.standard_normal(first.shape)
         elapsed = _elapsed(scans, np.asarray(starts), alive)
         if isinstance(self.motion, Modes):
+            modes = np.zeros(alive.shape, np.int64)
             for i, own in enumerate(rng.spawn(num)):
-                states[i] = manoeuvring_target(self.motion, first[i], elapsed[i], own if noisy[i] else None)
-            return Truth.from_arrays(scans, alive, states)
+                states[i], modes[i] = manoeuvring_target(self.motion, first[i], elapsed[i], own if noisy[i] else None)
+            return Truth.from_arrays(scans, alive, states, detection_factors_of(self.motion, modes))
         normals = np.zeros_like(states)
         # Ordered by target and then by time, so that the noise of a target does not depend on the lives of the others.
         moves = (elapsed > 0.0) & noisy[:, None]

@@ -11,7 +11,13 @@ from vedette.kernels.base.types import Bools, Floats, Ints
 from vedette.models import Modes, MotionModel, Region
 from vedette.models.arguments import float_array, generator, reject
 from vedette.models.fields import Count, Probability, check_fields
-from vedette.simulation.true_motion import check_moved, first_mode, moved_target, semidefinite_factor
+from vedette.simulation.true_motion import (
+    check_moved,
+    detection_factors_of,
+    first_mode,
+    moved_target,
+    semidefinite_factor,
+)
 from vedette.simulation.truth import Truth, scan_times
 
 
@@ -71,7 +77,9 @@ class UniformTargets:
             all_ids.append(ids)
             all_states.append(states)
         offsets: Ints = np.concatenate([[0], np.cumsum([len(ids) for ids in all_ids])]).astype(np.int64)
-        return Truth(scans, offsets, np.concatenate(all_ids), np.concatenate(all_states)[:, : self.motion.state_dim])
+        rows, dim = np.concatenate(all_states), self.motion.state_dim
+        factors = detection_factors_of(self.motion, rows[:, -1])
+        return Truth(scans, offsets, np.concatenate(all_ids), rows[:, :dim], factors)
 
     def _born(self, num: int, rng: np.random.Generator) -> Floats:
         """(num, state_dim) initial states, behind them the mode of a motion with modes."""

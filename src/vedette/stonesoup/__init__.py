@@ -6,7 +6,7 @@ require_packages("vedette.stonesoup", "stonesoup")
 
 from vedette.stonesoup.converting import ConvertedModels, convert
 from vedette.stonesoup.manager import PlanningSensorManager
-from vedette.stonesoup.motions import StateLayout, convert_motion
+from vedette.stonesoup.motions import StateLayout, convert_modes, convert_motion
 from vedette.stonesoup.scans import ScanConverter, convert_truth
 from vedette.stonesoup.sensors import (
     convert_clutter,
@@ -27,6 +27,7 @@ __all__ = [
     "convert_clutter",
     "convert_detection",
     "convert_measurement",
+    "convert_modes",
     "convert_motion",
     "convert_noise",
     "convert_pose",

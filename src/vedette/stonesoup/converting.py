@@ -96,7 +96,7 @@ def convert(
     """Convert models of Stone Soup into equal Vedette models.
 
     Args:
-        transition_model: see `convert_motion`.
+        transition_model: see `convert_motion`. Of targets that change their motion, the result of `convert_modes`.
         sensors: sensors or measurement models (see `convert_measurement`), one or more. Several by the names in their
             detections' `metadata["sensor"]`, or in a list, for names "0", "1", ...
         births: where targets appear. A `GaussianState`, as the prior of a `SimpleMeasurementInitiator`: at every

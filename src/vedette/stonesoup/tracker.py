@@ -17,6 +17,7 @@ from stonesoup.types.track import Track
 from stonesoup.types.update import GaussianStateUpdate
 
 from vedette.densities import marginal_estimate
+from vedette.densities.estimates import joined_mode_probs
 from vedette.errors import InputError
 from vedette.kernels.base.types import Floats
 from vedette.models.measurement import wrap_periodic
@@ -36,10 +37,11 @@ class LabelledTracker(_TrackerMixInUpdate, Tracker):  # type: ignore[misc] # Sto
     A label has a track from the time its existence exceeds `existence_threshold` until it no longer exceeds
     `end_threshold`, with a state at every time. It then also has the earlier states since it exceeded `end_threshold`,
     like tracks of Stone Soup's initiators. Its `id` is the label ("birth step.index"), if it returns "birth step.index
-    (2)", and `metadata["existence"]` the probability. The state is a `GaussianStateUpdate`. As a filter averages over
-    associations, its hypothesis names the detection that is nearest to the updated state in standard deviations of the
-    sensor's noise, over all sensors, or a `MissedDetection` if none is near. The prediction in it is the predicted last
-    state of the track. A new track has none.
+    (2)", and `metadata["existence"]` the probability. With modes of motion, `metadata["modes"]` has the probability of
+    each, by name. The state is a `GaussianStateUpdate`. As a filter averages over associations, its hypothesis names
+    the detection that is nearest to the updated state in standard deviations of the sensor's noise, over all sensors,
+    or a `MissedDetection` if none is near. The prediction in it is the predicted last state of the track. A new track
+    has none.
     """
 
     detector: Any = Property(doc="Yields times and sets of detections: a detector, reader, simulator or list.")
@@ -71,6 +73,7 @@ class LabelledTracker(_TrackerMixInUpdate, Tracker):  # type: ignore[misc] # Sto
             raise InputError("tracker: expected one of models.targets and models.sensors; got one of others")
         self.state: State = self.tracker.initial()
         self.info: TrackerInfo | None = None
+        self._mode_names: tuple[str, ...] = getattr(self.models.targets.motion, "names", ())
         self._scans = ScanConverter(self.models, self.every_sensor_scans)
         if not 0.0 <= self.end_threshold <= self.existence_threshold < 1.0:
             given = f"{self.end_threshold} and {self.existence_threshold}"
@@ -92,8 +95,9 @@ class LabelledTracker(_TrackerMixInUpdate, Tracker):  # type: ignore[misc] # Sto
         self.state, self.info = self.tracker.step(self.state, given.scans, given.poses, given.time, rngs=self._rngs)
         before, self._current = self._current, {}
         estimate = marginal_estimate(self.state.fused, self.end_threshold)
-        for label, mean, cov, existence in zip(
-            map(tuple, estimate.labels.tolist()), estimate.means, estimate.covs, estimate.existence, strict=True
+        modes = joined_mode_probs([estimate], len(self._mode_names))
+        for label, mean, cov, existence, own in zip(
+            map(tuple, estimate.labels.tolist()), estimate.means, estimate.covs, estimate.existence, modes, strict=True
         ):
             if existence > self.existence_threshold:
                 self._confirmed.add(label)
@@ -106,6 +110,8 @@ class LabelledTracker(_TrackerMixInUpdate, Tracker):  # type: ignore[misc] # Sto
             else:
                 track.append(update)
             track.metadata["existence"] = float(existence)
+            if self._mode_names:
+                track.metadata["modes"] = dict(zip(self._mode_names, own.tolist(), strict=True))
             self._current[label] = track
         self._ended.update(before.keys() & self._confirmed)
         self._confirmed -= before.keys()

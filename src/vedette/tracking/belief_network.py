@@ -236,7 +236,7 @@ class BeliefNetwork(LocalFilters):
             key = id(belief), id(earlier[i]), received
             if key not in cache:
                 candidates = births_from_received_scans(
-                    birth, belief, self.sensors, scans, poses, sent.step + 1, received
+                    birth, belief, self.sensors, scans, poses, sent.step + 1, received, self.targets.motion
                 )
                 cache[key] = combine_births(birth, earlier[i], candidates)
             births.append(cache[key])

@@ -23,8 +23,9 @@ from vedette.kernels.association.truncation import Truncation
 from vedette.kernels.base.types import Floats, Ints, Lmb, ScanInput
 from vedette.kernels.labelled.births import BirthsOfMeasurements, births_of_measurements
 from vedette.kernels.steps.association_probability import prob_explained
-from vedette.models import BirthModel, MeasurementBirth, SensorModel
+from vedette.models import BirthModel, MeasurementBirth, MotionModel, SensorModel
 from vedette.models.arguments import pose_vector, reject
+from vedette.models.modes import sensor_of_filter
 from vedette.models.scan_rows import as_scan, to_measurements
 from vedette.tracking.birth_velocities import at_scan_time, with_velocities
 
@@ -96,6 +97,7 @@ def births_from_scans(
     step: int,
     *,
     owner: int | None = None,
+    motion: MotionModel | None = None,
 ) -> LMB | None:
     """Return the birth candidates for `step` from the scans before it. Several sensors' measurements are pooled.
 
@@ -107,6 +109,7 @@ def births_from_scans(
         sensors, scans, poses: one per sensor. A scan is None if the sensor did not scan.
         step: step in the labels of the births. Their indices follow those of the sites.
         owner: sensor that makes the births alone, with its own range of indices. None: all sensors together.
+        motion: of the targets, whose modes may be detected with another probability. None: they are not.
 
     Raises:
         InputError: a belief without labels, or a measurement that does not determine the position of its target.
@@ -121,7 +124,7 @@ def births_from_scans(
     scans = [scan if sensor.measurement.places else None for sensor, scan in zip(sensors, scans, strict=True)]
     scanned = [s for s, scan in enumerate(scans) if scan is not None]
     checked = [pose_vector("pose", poses[s]) for s in scanned]
-    found = unexplained_measurements(model, belief, sensors, scans, poses)
+    found = unexplained_measurements(model, belief, sensors, scans, poses, motion)
     births = LMB.from_kernel(births_of_measurements(found.states, found.probabilities, parameters))
     births = with_velocities(births, model.std, sensors, scans, poses)
     return at_scan_time(births, checked)
@@ -143,12 +146,17 @@ def combine_births(birth: BirthModel, earlier: LMB | None, later: LMB | None) ->
 
 
 def unexplained_measurements(
-    model: MeasurementBirth, belief: LabelledDensity, sensors: Sequence[SensorModel], scans: Sequence[Any], poses: Any
+    model: MeasurementBirth,
+    belief: LabelledDensity,
+    sensors: Sequence[SensorModel],
+    scans: Sequence[Any],
+    poses: Any,
+    motion: MotionModel | None = None,
 ) -> UnexplainedMeasurements:
     """Return the measurements that no track explains with certainty, pooled over sensors. See `births_from_scans`."""
     lmb = _as_kernel(belief)
     by_sensor = [
-        _unexplained_by_sensor(lmb, sensor, scans[s], pose_vector("pose", poses[s]), s)
+        _unexplained_by_sensor(lmb, sensor, scans[s], pose_vector("pose", poses[s]), s, motion)
         for s, sensor in enumerate(sensors)
         if scans[s] is not None
     ]
@@ -165,11 +173,12 @@ def births_from_received_scans(
     poses: Any,
     step: int,
     received: Sequence[int],
+    motion: MotionModel,
 ) -> LMB | None:
     """Return `births_from_scans` for the scans of the sensors `received`. If some are missing, the first owns them."""
     received_scans = [scan if s in received else None for s, scan in enumerate(scans)]
     owner = None if len(received) == len(sensors) else received[0]
-    return births_from_scans(birth, belief, sensors, received_scans, poses, step, owner=owner)
+    return births_from_scans(birth, belief, sensors, received_scans, poses, step, owner=owner, motion=motion)
 
 
 def _as_kernel(belief: LabelledDensity) -> Lmb:
@@ -185,11 +194,12 @@ def _scan_input(belief: Lmb, sensor: SensorModel, scan: Any, pose: Floats) -> Sc
 
 
 def _unexplained_by_sensor(
-    belief: Lmb, sensor: SensorModel, scan: Any, pose: Floats, number: int
+    belief: Lmb, sensor: SensorModel, scan: Any, pose: Floats, number: int, motion: MotionModel | None
 ) -> UnexplainedMeasurements:
     scan_input = _scan_input(belief, sensor, scan, pose)
     with model_errors():
-        explained = prob_explained(belief, scan_input, sensor.to_kernel(), _truncation(sensor.meas_dim))
+        seen = sensor.to_kernel() if motion is None else sensor_of_filter(sensor, motion)
+        explained = prob_explained(belief, scan_input, seen, _truncation(sensor.meas_dim))
     indices = np.flatnonzero(explained < 1.0 - MIN_UNEXPLAINED)
     states = sensor.measurement.states_at(
         scan_input.measurements.values[indices], scan_input.pose, belief.tracks.components.means.shape[1]

@@ -124,7 +124,8 @@ class Central(MultiSensorFilterTracker):
         timer, step = StageTimer(), state.step + 1
         with timer.timing("filter"):
             belief, info = self._filter(state.fused, state.memory, scans, pose_array, dt, step, rngs[0])
-            measured = births_from_scans(self.birth, belief, self.sensors, scans, pose_array, step + 1)
+            motion = self.targets.motion
+            measured = births_from_scans(self.birth, belief, self.sensors, scans, pose_array, step + 1, motion=motion)
             if dt == 0.0:
                 measured = combine_births(self.birth, state.memory, measured)
         sent = tuple(scan_bytes(scan, pose) for scan, pose in zip(scans, pose_array, strict=True))

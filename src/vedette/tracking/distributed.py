@@ -140,11 +140,13 @@ class Distributed(LocalFilters):
         self, local: Sequence[Any], scans: Sequence[Any], poses: Floats, step: int
     ) -> tuple[LMB | None, ...]:
         """Return each sensor's birth candidates for `step`, as one object for all sensors if they share a belief."""
-        birth, sensors = self.birth, self.sensors
+        birth, sensors, motion = self.birth, self.sensors, self.targets.motion
         if self.feedback or len(local) == 1:
-            return (births_from_scans(birth, local[0], sensors, scans, poses, step),) * len(local)
+            return (births_from_scans(birth, local[0], sensors, scans, poses, step, motion=motion),) * len(local)
         return tuple(
-            births_from_scans(birth, belief, sensors[s : s + 1], scans[s : s + 1], poses[s : s + 1], step, owner=s)
+            births_from_scans(
+                birth, belief, sensors[s : s + 1], scans[s : s + 1], poses[s : s + 1], step, owner=s, motion=motion
+            )
             for s, belief in enumerate(local)
         )
 

@@ -142,7 +142,7 @@ class ScanNetwork(MultiSensorFilterTracker):
         """
         birth, next_step = self.targets.birth, frame.step + 1
         candidates = births_from_received_scans(
-            birth, belief, self.sensors, frame.scans, frame.poses, next_step, senders
+            birth, belief, self.sensors, frame.scans, frame.poses, next_step, senders, self.targets.motion
         )
         return combine_births(birth, earlier, candidates)
 

@@ -116,7 +116,7 @@ class UndetectedTargetTracker(TrackerWrapper):
         birth = self.targets.birth.from_measurements
         if birth is None:
             return 0.0
-        measurements = unexplained_measurements(birth, after.fused, self.sensors, scans, poses)
+        measurements = unexplained_measurements(birth, after.fused, self.sensors, scans, poses, self.targets.motion)
         return expected_in_cells(
             measurements.states[:, :2], birth.max_existence * measurements.probabilities, self.model.grid
         )

@@ -36,9 +36,9 @@ def targets_in_view(
         raise reject("sensors", f"one for each of {poses.shape[1]} sensors", f"{len(sensors)}")
     in_view = np.zeros(len(truth.states), np.bool_)
     for scan in range(truth.num_scans):
-        rows = slice(truth.offsets[scan], truth.offsets[scan + 1])
+        rows, factors = slice(truth.offsets[scan], truth.offsets[scan + 1]), truth.detection_factors_at(scan)
         for pose, sensor in zip(poses[scan], sensors, strict=True):
-            in_view[rows] |= sensor.detection.prob(truth.states[rows], pose) >= min_detection_probability
+            in_view[rows] |= factors * sensor.detection.prob(truth.states[rows], pose) >= min_detection_probability
     return in_view
 
 

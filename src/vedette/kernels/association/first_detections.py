@@ -28,7 +28,7 @@ from vedette.kernels.gaussian.components import components_like, copy_component
 from vedette.kernels.gaussian.detection import moments_if_missed
 from vedette.kernels.gaussian.innovation import copy_innovation
 from vedette.kernels.gaussian.linalg import log_add, log_or_minus_inf
-from vedette.kernels.gaussian.marks import room_for_updated_marks
+from vedette.kernels.gaussian.marks import detection_factor, room_for_updated_marks
 from vedette.kernels.gaussian.relinearisation import make_pair_work
 
 _LEAST_SHARE = math.log(1e-5)  # least share of a component of the intensity in a candidate's density
@@ -85,8 +85,8 @@ def missed_intensity(seen: Rows, scan: ScanInput, sensor: Sensor, num: int, left
             out.log_weights[c] + log_or_minus_inf(1.0 - detected), log_or_minus_inf(left_out[c])
         )
         if seen.innovation.at_edge[c]:
-            mean, cov = components.means[c], components.covs[c]
-            moments_if_missed(sensor, scan.pose, mean, cov, state, out.means[c], out.covs[c])
+            mean, cov, factor = components.means[c], components.covs[c], detection_factor(sensor, components.marks, c)
+            moments_if_missed(sensor, scan.pose, mean, cov, factor, state, out.means[c], out.covs[c])
     return out, -expected
 
 

@@ -20,7 +20,7 @@ from vedette.kernels.base.types import Floats, Ints, Marks, Measurements, ScanIn
 from vedette.kernels.gaussian.detection import detection_probability, moments_if_missed
 from vedette.kernels.gaussian.innovation import copy_innovation, whiten, write_posterior
 from vedette.kernels.gaussian.linalg import log_or_minus_inf
-from vedette.kernels.gaussian.marks import no_marks, room_for_updated_marks, update_marks
+from vedette.kernels.gaussian.marks import detection_factor, no_marks, room_for_updated_marks, update_marks
 from vedette.kernels.gaussian.relinearisation import Pair, PairWork, make_pair_work, update_pair
 from vedette.kernels.gaussian.row_noise import bring_noise, log_likelihood_ratio, mark_missing, noise_of_row
 
@@ -181,7 +181,10 @@ def _detected_there(rows: Rows, c: int, sight: Sight, whitened: Floats, updated:
     """Return the mean P_D of a component after a measurement. Its Gaussian is in `updated`, or is written there."""
     if not rows.innovation.bends[c]:
         write_posterior(rows.innovation, c, whitened, rows.components.means[c], updated)
-    return detection_probability(sight.sensor, sight.pose, updated[0], updated[1:], sight.work.scratch.points[0])
+    factor = detection_factor(sight.sensor, rows.components.marks, c)
+    return factor * detection_probability(
+        sight.sensor, sight.pose, updated[0], updated[1:], sight.work.scratch.points[0]
+    )
 
 
 @inlined
@@ -229,7 +232,8 @@ def _fill_options(rows: Rows, near: Near, sight: Sight, gate: float, out: Option
             if rows.innovation.at_edge[first + i]:
                 mean, cov, updated = components.means[first + i], components.covs[first + i], out.updated[entry + i]
                 state = sight.work.scratch.points[0]
-                moments_if_missed(sight.sensor, sight.pose, mean, cov, state, updated[0], updated[1:])
+                factor = detection_factor(sight.sensor, components.marks, first + i)
+                moments_if_missed(sight.sensor, sight.pose, mean, cov, factor, state, updated[0], updated[1:])
             peak = max(peak, out.component_log_weights[entry + i])
         if peak > -math.inf:
             total = _total_from_peak(out.component_log_weights, entry, count, peak)

@@ -17,7 +17,7 @@ from vedette.kernels.base.types import Floats, Ints, Lmb, Mixture, Motion, ScanI
 from vedette.kernels.gaussian.components import borrowed_components, components_like, copy_component, copy_components
 from vedette.kernels.gaussian.innovation import Innovation, expect, make_innovation
 from vedette.kernels.gaussian.linalg import log_add, log_or_minus_inf
-from vedette.kernels.gaussian.marks import mode_of
+from vedette.kernels.gaussian.marks import detection_factor
 from vedette.kernels.gaussian.modes import branched_tracks
 from vedette.kernels.gaussian.prediction import predict
 from vedette.kernels.gaussian.row_noise import bring_noise
@@ -102,10 +102,10 @@ def expect_rows(sensor: Sensor, scan: ScanInput, rows: Rows, scratch: Scratch) -
     for c in range(len(components.log_weights)):
         expect(sensor, scan.pose, components.means[c], components.covs[c], c, seen, scratch)
         seen.bends[c] = seen.bends[c] or by_pair
-        mode = mode_of(components.marks, c)
-        if mode >= 0 and len(sensor.mode_factors) > 0 and sensor.mode_factors[mode] < 1.0:
-            seen.prob_detection[c] *= sensor.mode_factors[mode]
-            seen.at_edge[c] = False
+        factor = detection_factor(sensor, components.marks, c)
+        if factor < 1.0:
+            seen.prob_detection[c] *= factor
+            seen.at_edge[c] = seen.at_edge[c] and factor > 0.0
 
 
 @inlined

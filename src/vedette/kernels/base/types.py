@@ -24,6 +24,8 @@ CLASSES = 1  # first of the log probabilities of the classes of a target
 # States begin with the position, those of four components or more also with the velocity. Others are found by name.
 VX, VY = 2, 3
 VELOCITY = slice(VX, VY + 1)  # m/s
+# Longest step of a chain of modes, in mean stays in the mode that is left fastest. A longer time is divided.
+LONGEST_MODE_STEP = 0.25
 HEIGHT, CLIMB = "pz", "vz"  # names of the height, m, and the vertical velocity, m/s
 PLANE = ("px", "py", "vx", "vy")
 STATE_COMPONENTS = {

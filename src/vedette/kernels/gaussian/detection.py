@@ -95,9 +95,16 @@ def detection_probability(sensor: Sensor, pose: Floats, mean: Floats, cov: Float
 
 @inlined
 def moments_if_missed(
-    sensor: Sensor, pose: Floats, mean: Floats, cov: Floats, state: Floats, out_mean: Floats, out_cov: Floats
+    sensor: Sensor,
+    pose: Floats,
+    mean: Floats,
+    cov: Floats,
+    factor: float,
+    state: Floats,
+    out_mean: Floats,
+    out_cov: Floats,
 ) -> None:
-    """Write mean and covariance of (1 - P_D(x)) N(x; mean, cov), normalised: of a target that was missed.
+    """Write mean and covariance of (1 - factor P_D(x)) N(x; mean, cov), normalised: of a target that was missed.
 
     Moments of the position are sums over nodes, those of the rest of the state follow by its regression on the
     position. They stay as they were where P_D is 1 at every node, or the position is known. state: (state_dim,) to be
@@ -109,7 +116,7 @@ def moments_if_missed(
     total, u, v, uu, uv, vv = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     for i in range(nodes.shape[0]):
         x, y = nodes[i, 1], nodes[i, 2]
-        missed = nodes[i, 0] * (1.0 - _at(sensor, pose, mean, root, x, y, state))
+        missed = nodes[i, 0] * (1.0 - factor * _at(sensor, pose, mean, root, x, y, state))
         total, u, v = total + missed, u + missed * x, v + missed * y
         uu, uv, vv = uu + missed * x * x, uv + missed * x * y, vv + missed * y * y
     for i in range(n):

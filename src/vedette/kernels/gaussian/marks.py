@@ -18,7 +18,7 @@ import math
 import numpy as np
 
 from vedette.kernels.base.compile import borrowing, inlined, kernel
-from vedette.kernels.base.types import CLASSES, MODE, Floats, Ints, Marks, Measurements
+from vedette.kernels.base.types import CLASSES, MODE, Floats, Ints, Marks, Measurements, Sensor
 from vedette.kernels.gaussian.linalg import normalise_logs
 
 NOT_DRAWN = -1  # as a mode
@@ -48,6 +48,13 @@ def room_for_updated_marks(measurements: Measurements, num: int) -> Marks:
 def mode_of(marks: Marks, c: int) -> int:
     """Return the mode of component `c`, or `NOT_DRAWN`."""
     return int(marks[c, MODE])
+
+
+@inlined
+def detection_factor(sensor: Sensor, marks: Marks, c: int) -> float:
+    """Return the factor of the mode of component `c` on the probability of detection, 1 without a mode."""
+    mode = mode_of(marks, c)
+    return float(sensor.mode_factors[mode]) if mode >= 0 and len(sensor.mode_factors) > 0 else 1.0
 
 
 @inlined

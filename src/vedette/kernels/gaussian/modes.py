@@ -12,22 +12,21 @@ import math
 import numpy as np
 
 from vedette.kernels.base.compile import kernel
-from vedette.kernels.base.types import Floats, Mixture, Motion, Tracks
+from vedette.kernels.base.types import LONGEST_MODE_STEP, Floats, Mixture, Motion, Tracks
 from vedette.kernels.gaussian.components import components_between, components_like, copy_component, make_components
-from vedette.kernels.gaussian.linalg import log_or_minus_inf
+from vedette.kernels.gaussian.linalg import log_or_minus_inf, log_sum
 from vedette.kernels.gaussian.marks import mode_of, set_mode
 from vedette.kernels.gaussian.prediction import predict, survival_probabilities
 from vedette.kernels.gaussian.reduction import MixtureCaps, make_reduction_work, reduce_into
 from vedette.kernels.gaussian.scratch import make_scratch
 
-# The longest step, in mean stays in the mode that is left fastest: a target changes at most once in most steps. A
-# longer time is divided.
-_LONGEST = 0.25
-_LIGHTEST = 1e-6  # share of the weight of a track below which predicted components are dropped
+# Predicted components are dropped below this share of the heaviest one of their track or intensity. In an intensity of
+# many targets the heaviest one is of about one of them, a share of the total would depend on their number.
+_LIGHTEST = 1e-6
 
 
 @kernel
-def mode_probabilities(rates: Floats, dt: float) -> Floats:
+def mode_transitions(rates: Floats, dt: float) -> Floats:
     """Return exp(rates dt), the probability of each mode (column) `dt` seconds after each mode (row).
 
     By uniformisation: the modes after a Poisson number of steps of a chain, with the rate of the fastest change, whose
@@ -77,8 +76,7 @@ def _after_step(tracks: Tracks, motion: Motion, dt: float) -> Tracks:
     out = make_components(room, dim, given.marks)
     wide = components_like(out, widest)
     floor = math.log(_LIGHTEST) if chain.merge_distance > 0.0 else -math.inf
-    caps = MixtureCaps(floor, chain.merge_distance, max(2, room))
-    probs, work, scratch = mode_probabilities(chain.rates, dt), make_reduction_work(widest, wide), make_scratch(dim, 1)
+    probs, work, scratch = mode_transitions(chain.rates, dt), make_reduction_work(widest, wide), make_scratch(dim, 1)
     offsets, filled = np.zeros(num + 1, np.int64), 0
     for i in range(num):
         width = 0
@@ -93,7 +91,9 @@ def _after_step(tracks: Tracks, motion: Motion, dt: float) -> Tracks:
                 set_mode(wide.marks, width, mode)
                 predict(motion, mode, dt, given.means[c], given.covs[c], wide.means[width], wide.covs[width], scratch)
                 width += 1
-        filled = reduce_into(wide, width, caps, work, out, filled)
+        own = wide.log_weights[:width]
+        lightest = floor + own.max() - log_sum(own) if width > 1 else floor
+        filled = reduce_into(wide, width, MixtureCaps(lightest, chain.merge_distance, max(2, room)), work, out, filled)
         offsets[i + 1] = filled
     return Tracks(tracks.labels, offsets, components_between(out, 0, filled))
 
@@ -112,7 +112,7 @@ def branched_tracks(tracks: Tracks, motion: Motion, dt: float) -> tuple[Tracks, 
         log_dead[i] = log_or_minus_inf(dead)
     for i in range(len(motion.switching.rates)):
         fastest = max(fastest, -motion.switching.rates[i, i])
-    num_steps = max(1, math.ceil(fastest * dt / _LONGEST))
+    num_steps = max(1, math.ceil(fastest * dt / LONGEST_MODE_STEP))
     moved = Tracks(tracks.labels, tracks.offsets, Mixture(log_weights, given.means, given.covs, given.marks))
     for _ in range(num_steps):
         moved = _after_step(moved, motion, dt / num_steps)

@@ -39,7 +39,7 @@ function drawNames(context, run, view, step, show) {
   (run.labelled ? run.estimates[step] : []).forEach((estimate, place) => {
     const height = run.heights?.estimates[step][place][0];
     const text = height === undefined ? estimate[0] : `${estimate[0]} ${flightLevel(height)}`;
-    add(text, at(estimate[1], estimate[2]), 5, estimateShade(run, estimate, show));
+    add(text, at(estimate[1], estimate[2]), 5, estimateShade(run, step, place, show));
   });
   const marks = [
     ...run.poses[step].map(([x, y]) => boxAround(...at(x, y), 7)),

@@ -19,7 +19,7 @@ function drawScene(canvas, run, step, show, camera, ghost) {
   run.sensors.forEach((_, s) => drawSensor(context, run, view, step, s));
   const tracked = trackedAt(run, step);
   run.truth[step].forEach((target) => drawTarget(context, view, target, tracked.has(target[0])));
-  run.estimates[step].forEach((estimate) => drawEstimate(context, run, view, estimate, show));
+  run.estimates[step].forEach((_, place) => drawEstimate(context, run, view, step, place, show));
   drawScale(context, view);
   if (show.labels) drawNames(context, run, view, step, show);
   context.restore();
@@ -116,8 +116,8 @@ function drawTrails(context, run, view, step, show) {
   }
   for (const path of paths.values()) polyline(context, view, path);
   for (let scan = 0; scan <= step; scan += 1) {
-    for (const estimate of run.estimates[scan]) {
-      context.fillStyle = estimateShade(run, estimate, show);
+    for (const [place, estimate] of run.estimates[scan].entries()) {
+      context.fillStyle = estimateShade(run, scan, place, show);
       context.globalAlpha = 0.55;
       disc(context, view.x(estimate[1]), view.y(estimate[2]), 1.6);
     }
@@ -204,12 +204,17 @@ function drawTarget(context, view, [, x, y], isTracked) {
   context.stroke();
 }
 
-// By label; beside another run in the colour of the strategy.
-const estimateShade = (run, [label], show) => (show.shade ? colours[show.shade] : seriesColour(placeOfLabel(run, label)));
+// By label, or by mode of motion; beside another run in the colour of the strategy.
+function estimateShade(run, step, place, show) {
+  if (show.shade) return colours[show.shade];
+  if (!show.modes || !run.modes) return seriesColour(placeOfLabel(run, run.estimates[step][place][0]));
+  const mode = run.modes[step][place];
+  return mode < 0 ? colours.grey : seriesColour(mode);
+}
 
-function drawEstimate(context, run, view, estimate, show) {
-  const [, x, y, , long, short, angle] = estimate;
-  const shade = estimateShade(run, estimate, show);
+function drawEstimate(context, run, view, step, place, show) {
+  const [, x, y, , long, short, angle] = run.estimates[step][place];
+  const shade = estimateShade(run, step, place, show);
   context.strokeStyle = shade;
   context.fillStyle = shade;
   context.lineWidth = 1.4;

@@ -22,6 +22,7 @@ function startReplay(root) {
   function draw() {
     state.view = drawScene(part("scene"), run(), state.step, show(), camera.aim(state.step), state.ghost);
     panels.draw(run().times[state.step], shown(), camera.camera);
+    part("modes-key").hidden = !show().modes || panels.all().length > 0;
     part("caption").textContent = captionOf(run(), state.step);
     part("caption").style.borderColor = `var(--${strategyShade(run())})`;
     const decision = decisionAt(run(), state.step);
@@ -168,6 +169,15 @@ function startReplay(root) {
     part("nothing").hidden = run().scans.length > 0;
     const searches = run().decisions.some((decision) => decision.undetected);
     for (const name of ["undetected", "undetected-key"]) part(name).hidden = !searches;
+    part("modes").hidden = !run().modes;
+    part("modes-key").replaceChildren(
+      ...(run().mode_names ?? []).map((name, mode) => {
+        const [key, disc] = [element("span", "key"), element("i", "dot")];
+        disc.style.background = `var(--${SERIES[mode % SERIES.length]})`;
+        key.append(disc, ` in mode ${name}`);
+        return key;
+      }),
+    );
     part("lost-key").hidden = !run().known;
     part("side").hidden = !run().decisions.length;
     part("stage").classList.toggle("alone", !run().decisions.length);
