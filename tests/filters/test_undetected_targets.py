@@ -217,7 +217,7 @@ def test_faint_labels_return_to_any_number_of_undetected_targets(log_number: flo
     """After a thousand empty scans, with a recorded camera, the number has no inverse in floating point."""
     means, covs = np.array([[0.0, 0.0, 1.0, 0.0]]), np.diag([4.0, 4.0, 1.0, 1.0])[np.newaxis]
     intensity = components_of(np.array([log_number]), means, covs)
-    returned = components_of(np.array([log_number - math.log(3.0)]), means + [2.0, 0.0, 0.0, 0.0], covs)
+    returned = components_of(np.array([log_number - math.log(3.0)]), means + np.array([2.0, 0.0, 0.0, 0.0]), covs)
     sites = np.array([[math.exp(log_number), 0.0, 0.0, 4.0, 4.0, 0.0]])
     found = with_returned(intensity, np.empty((0, 0)), Background(sites, np.empty(0), np.zeros(6)), returned)
     assert found.log_weights == pytest.approx([log_number + math.log(4.0 / 3.0)])

@@ -222,7 +222,7 @@ def test_the_bearing_of_an_extent_is_within_a_radian_at_the_sensor():
     noise = models.range_dependent_noise(sigma_bearing=0.01, extent=6.6)
     at = np.array([*POSE[:2], 1.0, 0.0])
     for offset in (0.0, 1.0, 6.6):
-        np.testing.assert_allclose(cov(noise, at + [offset, 0.0, 0.0, 0.0]), [[1.0001]])
+        np.testing.assert_allclose(cov(noise, at + np.array([offset, 0.0, 0.0, 0.0])), [[1.0001]])
     with pytest.raises(InputError, match=r"extent: expected a number of at least 0; got -1"):
         models.range_dependent_noise(sigma_bearing=0.01, extent=-1.0)
 

@@ -49,7 +49,7 @@ class RangeDependentNoise(Section):
     extent: float = Field(
         default=0.0,
         ge=0.0,
-        description="Standard deviation of the reflecting point of large targets, along and across the line of sight [m].",
+        description="Standard deviation of the reflecting point of large targets, along and across [m].",
     )
 
     def build(self, folder: FilePath, *, kind: str, **_: Any) -> NoiseModel:
