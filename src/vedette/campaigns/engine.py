@@ -1,7 +1,5 @@
 """Execution of tasks: in this process, or by workers."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Iterator
 from typing import Protocol

@@ -1,7 +1,5 @@
 """A whole campaign: executes the missing runs, stores each atomically, and writes the tables last."""
 
-from __future__ import annotations
-
 from collections.abc import Generator
 from contextlib import closing
 from dataclasses import dataclass

@@ -6,8 +6,6 @@ and in the metadata of its field. Null means that a metric has no value. A `step
 decision it is the scan that it followed.
 """
 
-from __future__ import annotations
-
 import json
 from collections.abc import Iterable
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """Validation of the inputs of planners, and the options of their sensors."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Planners: joint and independent decision making (paper, Algorithms 2 and 3)."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 from typing import ClassVar
 

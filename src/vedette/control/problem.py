@@ -1,7 +1,5 @@
 """The search problem of a joint decision, and the upper bound on its reward."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """A planner that is an external program, in any language, which answers a line of JSON per decision."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path

@@ -19,8 +19,6 @@ elimination and stopping conditions for the multi-armed bandit and reinforcement
 that is divided over rounds).
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass, field
 from typing import Literal

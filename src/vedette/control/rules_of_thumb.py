@@ -1,7 +1,5 @@
 """Rules of thumb: sensors head for the estimated targets, without any reward, as manual control would."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 from typing import Literal, TypeAlias, get_args
 

@@ -4,8 +4,6 @@ Kernels use a density's offsets and indices without checks, so what was checked 
 one of the arrays later could make a kernel read memory that it does not own.
 """
 
-from __future__ import annotations
-
 from abc import abstractmethod
 from collections.abc import Callable
 from operator import attrgetter

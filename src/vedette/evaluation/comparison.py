@@ -1,7 +1,5 @@
 """Comparison of strategies, over runs that share their random numbers."""
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace

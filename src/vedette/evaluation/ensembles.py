@@ -1,7 +1,5 @@
 """The runs of one strategy as arrays over runs and scans, for comparisons and reports."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, TypeAlias

@@ -1,7 +1,5 @@
 """One run of a scenario under a strategy."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from functools import partial
 from pathlib import Path

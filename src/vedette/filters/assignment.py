@@ -1,7 +1,5 @@
 """Data association methods of the filters."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 from typing import Annotated, Any, ClassVar, Protocol, TypeAlias, runtime_checkable
 

@@ -1,7 +1,5 @@
 """Protocols of filters, and the report of a step."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, Protocol, runtime_checkable

@@ -1,7 +1,5 @@
 """Protocols of fusion rules, the report of a fusion, and checks of its input."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass

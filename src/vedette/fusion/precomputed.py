@@ -1,7 +1,5 @@
 """Precomputed fusions for planners: power integrals of all joint actions without forming a fused density."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Protocol, runtime_checkable
 

@@ -1,7 +1,5 @@
 """Exchange of lines with many clients, protected against overload and clients without a token, and a TCP server."""
 
-from __future__ import annotations
-
 import asyncio
 import contextlib
 import hmac

@@ -1,7 +1,5 @@
 """Poisson clutter: the model, and clutter that is uniform in measurement space."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace

@@ -4,8 +4,6 @@
 the same part in a scenario reads and describes (`vedette.scenarios.sections.derived`).
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Iterator
 from functools import cache, partial

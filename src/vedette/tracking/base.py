@@ -1,7 +1,5 @@
 """Protocol of trackers, their state and report, timing of the stages of a step, and checks of its input."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """The protocol of constraints, and the data that they are evaluated on."""
 
-from __future__ import annotations
-
 import math
 from itertools import accumulate
 from typing import NamedTuple, Protocol, TypeVar, runtime_checkable

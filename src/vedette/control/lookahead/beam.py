@@ -1,7 +1,5 @@
 """Beam search over sequences: an ascent over the sensors, whose lines are searched by beams."""
 
-from __future__ import annotations
-
 import itertools
 import math
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """Context of constraints at later decisions: poses after earlier courses, and the belief predicted to that time."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import NamedTuple

@@ -1,7 +1,5 @@
 """Joint decisions over several periods, whose first actions are taken: open-loop receding horizon."""
 
-from __future__ import annotations
-
 import copy
 import itertools
 import math

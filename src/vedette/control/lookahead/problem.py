@@ -1,7 +1,5 @@
 """The search problem over joint sequences: its evaluations and its results."""
 
-from __future__ import annotations
-
 import itertools
 import math
 from collections.abc import Callable, Iterable

@@ -1,7 +1,5 @@
 """Protocols of rewards, and the value of a planned update."""
 
-from __future__ import annotations
-
 import math
 import numbers
 from collections.abc import Sequence

@@ -5,8 +5,6 @@ the update; the parameter vector of the function; and the output numbers. Positi
 state.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 from typing import ClassVar

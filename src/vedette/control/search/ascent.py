@@ -1,7 +1,5 @@
 """Coordinate ascent, one sensor at a time, and the automatic choice of a search by the number of sensors."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass

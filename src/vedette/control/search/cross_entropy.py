@@ -1,7 +1,5 @@
 """Cross-entropy search: joint actions are drawn from a distribution that moves towards the best of them."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """The search problem over joint actions, with the mean rewards found so far."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass

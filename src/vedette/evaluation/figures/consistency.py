@@ -1,7 +1,5 @@
 """Figure of the consistency of estimates with their covariances, over time."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 
 from matplotlib.axes import Axes

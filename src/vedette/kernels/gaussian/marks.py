@@ -10,8 +10,6 @@ The mode of a component is drawn at its first prediction (`vedette.kernels.gauss
 distributed as at birth, which is what a component without the column says too.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterable
 
