@@ -25,7 +25,7 @@ from vedette.campaigns.manifest import (
 )
 from vedette.campaigns.rows import Row
 from vedette.errors import InputError
-from vedette.evaluation.metrics import has_metrics
+from vedette.evaluation.metrics.serialization import has_metrics
 
 
 class Store(Writer):

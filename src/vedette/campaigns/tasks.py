@@ -14,7 +14,7 @@ from vedette.campaigns.cells import Campaign, Cell
 from vedette.campaigns.codec import encode
 from vedette.campaigns.rows import Row, row_of
 from vedette.errors import VedetteError
-from vedette.evaluation.metrics import encode_metrics
+from vedette.evaluation.metrics.serialization import encode_metrics
 from vedette.evaluation.runs import custom_metrics, measure_run, run_scenario
 from vedette.scenarios.sections.planners import STRATEGIES
 from vedette.simulation.serialization import encode_timings

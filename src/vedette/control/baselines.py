@@ -7,7 +7,9 @@ from typing import Any, ClassVar, Protocol, runtime_checkable
 
 import numpy as np
 
-from vedette.control.constraints import Constraint, ConstraintContext, nearest_feasible, violation_notes
+from vedette.control.constraints.mask import nearest_feasible
+from vedette.control.constraints.masks import violation_notes
+from vedette.control.constraints.protocol import Constraint, ConstraintContext
 from vedette.control.inputs import check_control_inputs, check_poses, mask_of_decision, options_of, predicted_beliefs
 from vedette.control.plan import Plan
 from vedette.control.settings import MobileSensor, PlanningSettings

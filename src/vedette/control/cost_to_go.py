@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from vedette.control.camera_turning import seconds_to_search, seconds_to_turn, turn_rate
-from vedette.control.constraints import Paths, VisibilityGraph
+from vedette.control.constraints.paths import Paths, VisibilityGraph
 from vedette.control.extrapolation import extrapolated, walked
 from vedette.control.settings import MobileSensor, PlanningSettings
 from vedette.densities import LMB, UndetectedIntensity

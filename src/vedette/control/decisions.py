@@ -10,7 +10,7 @@ from typing import Any, Literal, TypeAlias
 
 import numpy as np
 
-from vedette.control.constraints import Mask
+from vedette.control.constraints.mask import Mask
 from vedette.control.decision_analysis import DecisionAnalysis
 from vedette.control.evaluator import Evaluator
 from vedette.control.evidence import Evidence, Part
@@ -20,7 +20,7 @@ from vedette.control.plan import Plan, RewardTable, SamplingOutcome
 from vedette.control.preparation import Preparation
 from vedette.control.problem import beyond_cutoff, searched, upper_bound
 from vedette.control.racing import FIRST_ROUND, Race, next_total
-from vedette.control.search import JointSearch, all_joint_actions, first_best
+from vedette.control.search.problem import JointSearch, all_joint_actions, first_best
 from vedette.kernels.base.types import Floats, Ints
 from vedette.platforms import Actions, Options
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from vedette.control.additive.rewards import AdditiveRewards
 from vedette.control.additive.table import lay_out
-from vedette.control.constraints import VisibilityGraph, visibility_graph
+from vedette.control.constraints.paths import VisibilityGraph, visibility_graph
 from vedette.control.cost_to_go import CostToGo, attracting_targets
 from vedette.control.prediction import Prediction, predicted
 from vedette.control.pseudo_posterior_rewards import PseudoPosteriorRewards, SampleRewards

@@ -9,7 +9,9 @@ from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 
-from vedette.control.constraints import Constraint, Mask, VisibilityGraph, visibility_graph
+from vedette.control.constraints.mask import Mask
+from vedette.control.constraints.paths import VisibilityGraph, visibility_graph
+from vedette.control.constraints.protocol import Constraint
 from vedette.control.evaluator import Evaluator
 from vedette.control.inputs import check_state, mask_of_decision, options_of
 from vedette.control.plan import SamplingOutcome

@@ -8,7 +8,7 @@ import numpy as np
 
 from vedette.errors import InputError
 from vedette.evaluation.ensembles import PARTS, Choice, Ensemble, build_ensemble, rounded_choice
-from vedette.evaluation.metrics import RunMetrics
+from vedette.evaluation.metrics.run import RunMetrics
 from vedette.evaluation.statistics import PairedDifference, Summary, holm, paired_difference, summarise
 from vedette.internal.representation import SummaryRepr
 from vedette.internal.text import elided, pluralise

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from vedette.control import Constraint, MobileSensor, PlanningSettings
-from vedette.control.constraints import Mask, nearest_feasible
+from vedette.control.constraints.mask import Mask, nearest_feasible
 from vedette.control.inputs import mask_of_decision, options_of, single_mask
 from vedette.densities import LabelledDensity, best_estimate
 from vedette.errors import InputError

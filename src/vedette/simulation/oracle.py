@@ -16,7 +16,7 @@ from vedette.control import (
     Plan,
     PlanningSettings,
 )
-from vedette.control.constraints import Mask, nearest_feasible
+from vedette.control.constraints.mask import Mask, nearest_feasible
 from vedette.control.inputs import check_control_inputs, check_poses, mask_of_decision, options_of
 from vedette.densities import Estimator, best_estimate
 from vedette.errors import InputError

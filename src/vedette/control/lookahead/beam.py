@@ -8,7 +8,7 @@ import numpy as np
 
 from vedette.control.lookahead.courses import Sequence
 from vedette.control.lookahead.problem import JointSequence, SequenceProblem
-from vedette.control.search import tie_tolerance
+from vedette.control.search.problem import tie_tolerance
 from vedette.models.fields import Checked, Count
 
 

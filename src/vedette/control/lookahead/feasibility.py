@@ -11,8 +11,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from vedette.control.constraints import Mask, infeasible_note, nearest_feasible, relaxed
-from vedette.control.constraints.mask import depth_first
+from vedette.control.constraints.mask import Mask, depth_first, nearest_feasible, relaxed
+from vedette.control.constraints.masks import infeasible_note
 from vedette.control.lookahead.constraints import MultiStepConstraints
 from vedette.control.lookahead.courses import CourseTree, Sequence
 from vedette.kernels.base.types import Bools

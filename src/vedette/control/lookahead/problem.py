@@ -14,7 +14,7 @@ from vedette.control.explanation import Bound
 from vedette.control.lookahead.courses import CourseTree, Sequence
 from vedette.control.lookahead.feasibility import FeasibleSequences
 from vedette.control.plan import SearchCurve
-from vedette.control.search import first_best
+from vedette.control.search.problem import first_best
 from vedette.kernels.base.types import Bools, Floats, Ints
 from vedette.kernels.planning.ascent import Cells
 from vedette.platforms import Options

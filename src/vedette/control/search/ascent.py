@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from vedette.control.constraints import Active
+from vedette.control.constraints.active import Active
 from vedette.control.search.problem import Joint, JointProblem, RewardCache, best_of_all, tie_tolerance
 from vedette.models.fields import Checked, Count, Repeats, part
 

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from vedette.control.constraints import Mask
+from vedette.control.constraints.mask import Mask
 from vedette.control.search.problem import JointProblem, RewardCache
 from vedette.kernels.base.types import Floats, Ints
 from vedette.models.fields import Chance, Checked, Count, Portion, part

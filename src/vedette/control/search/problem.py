@@ -7,7 +7,7 @@ from typing import NamedTuple, Protocol, runtime_checkable
 
 import numpy as np
 
-from vedette.control.constraints import Mask, nearest_feasible, relaxed
+from vedette.control.constraints.mask import Mask, nearest_feasible, relaxed
 from vedette.errors import InputError
 from vedette.kernels.base.types import Floats, Ints
 from vedette.models.fields import Checked, Count, part

@@ -18,7 +18,7 @@ from vedette.evaluation.figures.style import (
     span_times,
     styled,
 )
-from vedette.evaluation.metrics import AverageNees
+from vedette.evaluation.metrics.consistency import AverageNees
 from vedette.kernels.base.types import Floats
 
 
