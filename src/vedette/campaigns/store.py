@@ -4,8 +4,6 @@ The folder contains `manifest.json` (the campaign as data, and its sessions with
 `campaign.sqlite` (the finished runs). Read it with `vedette.campaigns.results.open_results`.
 """
 
-from __future__ import annotations
-
 from collections.abc import Collection, Mapping
 from pathlib import Path
 from types import TracebackType
@@ -43,7 +41,7 @@ class Store(Writer):
         self._sessions: list[dict[str, Any]] = manifest["sessions"]
 
     @classmethod
-    def open(cls, folder: Path | str, campaign: Campaign) -> Store:
+    def open(cls, folder: Path | str, campaign: Campaign) -> "Store":
         """Create the folder, or continue with it.
 
         A campaign may continue with a larger number of runs. A smaller number does not reduce it.
@@ -118,7 +116,7 @@ class Store(Writer):
             self.open_runs(contents)
         return manifest
 
-    def __enter__(self) -> Store:
+    def __enter__(self) -> "Store":
         return self
 
     def __exit__(

@@ -1,7 +1,5 @@
 """Tasks of a campaign: the unit of work of a worker, its outcome, and the order of tasks."""
 
-from __future__ import annotations
-
 import heapq
 import math
 import time
@@ -39,7 +37,7 @@ class Task:
     runs: tuple[int, ...]
     versions: Mapping[str, str]
 
-    def alone(self) -> Iterator[Task]:
+    def alone(self) -> "Iterator[Task]":
         """Yield one task for each run."""
         return (replace(self, runs=(run,)) for run in self.runs)
 

@@ -1,7 +1,5 @@
 """The planner protocol, planners without rewards (random, fixed), and a wrapper that reports violations."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field, replace
 from typing import Any, ClassVar, Protocol, runtime_checkable
 
@@ -137,7 +135,7 @@ class ConstraintReportingPlanner:
         """Name of the planner."""
         return self.planner.name
 
-    def with_truth(self, truth: Any) -> ConstraintReportingPlanner:
+    def with_truth(self, truth: Any) -> "ConstraintReportingPlanner":
         """Return this planner with the true targets, if the wrapped planner requires them."""
         planner = self.planner
         return replace(self, planner=planner.with_truth(truth)) if isinstance(planner, RequiresTruth) else self

@@ -5,8 +5,6 @@ Distributed Reinforcement Learning, 2020). The policy goes to one target by the 
 where it will be then, and follows it.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -66,7 +64,7 @@ class CostToGo:
         places: Floats,
         graph: VisibilityGraph,
         undetected: UndetectedIntensity | None,
-    ) -> CostToGo:
+    ) -> "CostToGo":
         """Return the data for these targets. graph: of the zones that constraints forbid."""
         reaches = np.array([detection_range(sensor, own.pose) for sensor, own in zip(sensors, options, strict=True)])
         paths = tuple([graph.to(places, own.pose[:2]) for own in options])

@@ -1,7 +1,5 @@
 """Decisions: rewards on samples and a search over them, with rounds of fresh samples if a confidence is required."""
 
-from __future__ import annotations
-
 import math
 import time
 from collections.abc import Sequence
@@ -82,7 +80,7 @@ class Rounds:
         others: tuple[int, ...] | None = None,
         *,
         rng: np.random.Generator,
-    ) -> Rounds:
+    ) -> "Rounds":
         """Return rounds with an evaluator of all courses on `num_samples` samples."""
         deadline = Deadline(time.perf_counter(), preparation.settings.max_seconds)
         return cls(preparation, preparation.evaluator(num_samples, rng=rng), num_samples, rng, deadline, others)

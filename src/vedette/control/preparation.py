@@ -1,7 +1,5 @@
 """How a decision is evaluated: by sums over labels if beliefs, fusion and reward allow it, otherwise case by case."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
@@ -85,7 +83,7 @@ class Preparation:
         state: State,
         poses: Any,
         constraints: Sequence[Constraint] = (),
-    ) -> Preparation:
+    ) -> "Preparation":
         """Return the preparation. Raises `InputError` for invalid inputs."""
         options = options_of(sensors, poses, settings)
         planned = planning_beliefs(sensors, fusion, settings, reward, state)

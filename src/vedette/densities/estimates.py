@@ -1,7 +1,5 @@
 """Estimates extracted from a density, and track histories under stable labels."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
@@ -111,7 +109,7 @@ class Estimate(TabularRepr):
         return self._targets().in_words()
 
     @classmethod
-    def empty(cls, state_dim: int) -> Estimate:
+    def empty(cls, state_dim: int) -> "Estimate":
         """Return an estimate without targets."""
         return cls(np.empty((0, 2), np.int64), *no_gaussians(state_dim), np.empty(0))
 

@@ -1,7 +1,5 @@
 """Observations of a policy before a decision: beliefs, sensors and their actions as arrays of fixed size."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, NamedTuple, TypeAlias
@@ -60,7 +58,7 @@ class ObservationEncoder(Checked):
     num_labels: Count = 10
 
     @classmethod
-    def of(cls, parts: Mapping[str, Any], num_labels: int = 10) -> ObservationEncoder:
+    def of(cls, parts: Mapping[str, Any], num_labels: int = 10) -> "ObservationEncoder":
         """Return the encoder for the parts of a scenario's planner (`vedette.scenarios.build.build_parts`)."""
         schedule = parts["oracle"]["schedule"]
         return cls(parts["sensors"], parts["settings"], parts["constraints"], schedule, num_labels)

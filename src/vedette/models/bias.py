@@ -1,7 +1,5 @@
 """Constant bias of a sensor's measurements, clock and position."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, fields
 
@@ -45,7 +43,7 @@ class Bias:
     def __post_init__(self) -> None:
         check_fields(self, "Bias.")
 
-    def __sub__(self, other: Bias) -> Bias:
+    def __sub__(self, other: "Bias") -> "Bias":
         """Return the difference of two biases, component by component."""
         return Bias(*(getattr(self, each.name) - getattr(other, each.name) for each in fields(self)))
 

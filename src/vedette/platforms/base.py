@@ -3,8 +3,6 @@
 This is the only place where results of platforms are validated.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 from typing import Any, NamedTuple, Protocol, runtime_checkable
@@ -43,7 +41,7 @@ class Options(NamedTuple):
     scans: (num_courses, num_times) whether the actions of each course let the sensor scan.
     """
 
-    actions: Actions
+    actions: "Actions"
     courses: Floats
     which: Ints
     pose: Floats
@@ -54,7 +52,7 @@ class Options(NamedTuple):
         """Return the first action that leads to a course."""
         return int(np.flatnonzero(self.which == course)[0])
 
-    def at(self, times: slice) -> Options:
+    def at(self, times: slice) -> "Options":
         """Return the options at some of the times of their courses."""
         return self._replace(courses=np.ascontiguousarray(self.courses[:, times]), scans=self.scans[:, times])
 
@@ -67,13 +65,13 @@ class Abilities(NamedTuple):
     has_scans: bool
 
     @classmethod
-    def of(cls, platform: Platform) -> Abilities:
+    def of(cls, platform: "Platform") -> "Abilities":
         """Return the abilities of a platform."""
         return cls(*[provides(platform, more) for more in (SupportsManyActions, HasPrices, HasScans)])
 
 
 def options_at(
-    field: str, platform: Platform, pose: Floats, times: Floats, abilities: Abilities | None = None
+    field: str, platform: "Platform", pose: Floats, times: Floats, abilities: Abilities | None = None
 ) -> Options:
     """Return the options of a platform at a pose, distinguished by price, poses and scans at `times`, in s from now.
 
@@ -132,7 +130,7 @@ class Actions(SummaryRepr):
         object.__setattr__(self, "values", values)
 
     @classmethod
-    def of(cls, **numbers: float) -> Actions:
+    def of(cls, **numbers: float) -> "Actions":
         """Return a single action, as in `Actions.of(heading_deg=30.0)`."""
         return cls(tuple(numbers), np.array([list(numbers.values())]))
 

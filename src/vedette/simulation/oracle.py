@@ -1,7 +1,5 @@
 """Oracle planner that knows the true targets: a lower bound for control, to compare plans with."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field, replace
 from typing import ClassVar, NamedTuple
 
@@ -107,7 +105,7 @@ class OraclePlanner:
         """Motion model of the targets in the filters."""
         return common_target_model([sensor.filter for sensor in self.sensors]).motion
 
-    def with_truth(self, truth: Truth) -> OraclePlanner:
+    def with_truth(self, truth: Truth) -> "OraclePlanner":
         """Return the planner for the targets of a run."""
         return replace(self, truth=truth)
 

@@ -1,7 +1,5 @@
 """True targets: the truth of a run, and targets that follow a motion model."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Protocol
@@ -52,11 +50,11 @@ class Truth(SummaryRepr):
         rows = slice(self.offsets[scan], self.offsets[scan + 1])
         return self.ids[rows], self.states[rows]
 
-    def first(self, num_scans: int) -> Truth:
+    def first(self, num_scans: int) -> "Truth":
         """Return the truth of the first scans."""
         return self.between(0, num_scans)
 
-    def between(self, first: int, end: int) -> Truth:
+    def between(self, first: int, end: int) -> "Truth":
         """Return the truth of the scans from `first`, counted from 0, to the one before `end`."""
         rows = slice(self.offsets[first], self.offsets[end])
         offsets = self.offsets[first : end + 1] - self.offsets[first]
@@ -79,7 +77,7 @@ class Truth(SummaryRepr):
             raise reject("Truth.ids", f"each id once in scan {scan}", self.at(scan)[0])
 
     @classmethod
-    def from_arrays(cls, times: Floats, alive: Bools, states: Floats) -> Truth:
+    def from_arrays(cls, times: Floats, alive: Bools, states: Floats) -> "Truth":
         """Return the truth for (num_targets, num_scans) flags and (num_targets, num_scans, state_dim) states.
 
         Row i is target i.

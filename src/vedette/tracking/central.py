@@ -1,7 +1,5 @@
 """Central tracker: one filter processes the scans of all sensors. It is the reference for every fusion of beliefs."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Protocol, runtime_checkable
@@ -108,7 +106,7 @@ class Central(MultiSensorFilterTracker):
     Attributes and errors: as in `MultiSensorFilterTracker`.
     """
 
-    def with_truth(self, truth: Any) -> Central:
+    def with_truth(self, truth: Any) -> "Central":
         """Return the tracker with a run's true targets passed to its filter, if the filter takes them, else itself."""
         return replace(self, filter=self.filter.with_truth(truth)) if hasattr(self.filter, "with_truth") else self
 

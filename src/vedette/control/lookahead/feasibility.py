@@ -1,7 +1,5 @@
 """Joint sequences that constraints allow, pairs of sensors included, and the search for one of them."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator
 from collections.abc import Sequence as Several
@@ -44,7 +42,7 @@ class FeasibleSequences:
     _single: dict[tuple[int, Sequence], bool] = field(default_factory=dict)
 
     @classmethod
-    def of(cls, trees: tuple[CourseTree, ...], ahead: MultiStepConstraints) -> FeasibleSequences:
+    def of(cls, trees: tuple[CourseTree, ...], ahead: MultiStepConstraints) -> "FeasibleSequences":
         """Return the feasible sequences of trees without constraints.
 
         Dead ends are left out, unless this leaves pairs of sensors no feasible courses at the first decision. If no
