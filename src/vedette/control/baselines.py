@@ -25,11 +25,9 @@ class Planner(Protocol):
     @property
     def name(self) -> str:
         """Name of the strategy, as in `Plan.planner`."""
-        ...
 
     def plan(self, state: State, poses: Floats, *, rng: np.random.Generator) -> Plan:
         """Return the plan for the state of a tracker after a scan and the sensor poses (num_sensors, 3 or more)."""
-        ...
 
 
 @runtime_checkable
@@ -38,7 +36,6 @@ class RequiresTruth(Protocol):
 
     def with_truth(self, truth: Any) -> Planner:
         """Return the planner for these targets, a `vedette.simulation.Truth`."""
-        ...
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -144,7 +144,6 @@ class Estimator(Protocol):
 
     def __call__(self, density: Any, step: int) -> Estimate:
         """Return the estimate at scan `step`, counted from 1, which labels targets of an unlabelled density."""
-        ...
 
 
 def map_estimate(density: LabelledDensity) -> Estimate:

@@ -21,7 +21,6 @@ class MarginalAssociation(Protocol):
 
     def to_kernel(self) -> Association | None:
         """Return the kernel form of the method, or None for the sums over clusters."""
-        ...
 
 
 @part("ranked", "assignment")

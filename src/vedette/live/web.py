@@ -41,7 +41,6 @@ class Screen(Protocol):
 
     def frame(self) -> bytes:
         """Return the current frame as JSON."""
-        ...
 
 
 class _WebClient:

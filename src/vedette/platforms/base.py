@@ -167,18 +167,15 @@ class Platform(Protocol):
     @property
     def columns(self) -> tuple[str, ...]:
         """Names of an action's numbers, such as `("heading_deg",)`. See `Actions`."""
-        ...
 
     def actions(self, pose: Floats) -> Floats:
         """Return (num_actions, num_columns) the possible actions at `pose`, at least one, in the order of tables."""
-        ...
 
     def course(self, pose: Floats, action: Floats, times: Floats) -> Floats:
         """Return (num_times, 3 or more) the poses `times` seconds after it began `action` at `pose`.
 
         action: one row of `actions`. Components of the pose beyond those returned stay as they are.
         """
-        ...
 
 
 @runtime_checkable
@@ -187,7 +184,6 @@ class SupportsManyActions(Protocol):
 
     def courses(self, pose: Floats, actions: Floats, times: Floats) -> Floats:
         """Return (num_actions, num_times, 3 or more) poses for actions (num_actions, num_columns)."""
-        ...
 
 
 @runtime_checkable
@@ -196,7 +192,6 @@ class HasPrices(Protocol):
 
     def prices(self, actions: Floats) -> Floats:
         """Return prices (num_actions,) in units of the reward, of actions (num_actions, num_columns)."""
-        ...
 
 
 @runtime_checkable
@@ -205,7 +200,6 @@ class HasScans(Protocol):
 
     def scans(self, pose: Floats, actions: Floats, times: Floats) -> Bools:
         """Return (num_actions, num_times) whether the sensor scans at `times`, s after each action began at `pose`."""
-        ...
 
 
 def check_platform(field: str, platform: Any) -> None:

@@ -23,11 +23,9 @@ class Compass(Protocol):
 
         `place` may also be an array of poses, whose first two components are used.
         """
-        ...
 
     def azimuth(self, angle: ArrayLike, place: ArrayLike) -> Floats:
         """Return azimuths, rad in [-pi, pi], of angles in the plane: the inverse of `angle`."""
-        ...
 
 
 @dataclass(frozen=True, slots=True)

@@ -199,4 +199,3 @@ class Measure(Protocol):
 
     def __call__(self, record: RunRecord) -> Any:
         """(num_scans,) numbers, NaN where undefined."""
-        ...

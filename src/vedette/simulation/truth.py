@@ -92,7 +92,6 @@ class TargetSource(Protocol):
 
     def truth(self, times: ArrayLike, *, rng: np.random.Generator) -> Truth:
         """Return the targets at each of (num_scans,) increasing scan times in seconds."""
-        ...
 
 
 def scan_times(times: ArrayLike) -> Floats:

@@ -86,16 +86,13 @@ class Tracker(Protocol):
     @property
     def targets(self) -> TargetModel:
         """Target model that all sensors share."""
-        ...
 
     @property
     def sensors(self) -> tuple[SensorModel, ...]:
         """Model of each sensor, in the order of scans and poses."""
-        ...
 
     def initial(self) -> State:
         """Return the state before the first scan."""
-        ...
 
     def step(
         self, state: State, scans: Sequence[Any], poses: Any, time: float, *, rngs: Sequence[np.random.Generator]
@@ -120,7 +117,6 @@ class Tracker(Protocol):
             ModelError, NumericalError: from the filters and the fusion. Every exception has a note with the stage that
                 raised it (`vedette.tracking.failed_stage`).
         """
-        ...
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -29,16 +29,13 @@ class CentralFilter(Protocol):
     @property
     def targets(self) -> TargetModel:
         """Target model."""
-        ...
 
     @property
     def sensors(self) -> tuple[SensorModel, ...]:
         """Model of each sensor."""
-        ...
 
     def initial(self) -> Any:
         """Return the belief before the first scans."""
-        ...
 
     def step(
         self, belief: Any, scans: Any, poses: Any, dt: float, step: int, *, rng: np.random.Generator
@@ -47,7 +44,6 @@ class CentralFilter(Protocol):
 
         For births from measurements, a further argument `births` is the LMB of all birth candidates.
         """
-        ...
 
 
 @dataclass(frozen=True, slots=True, eq=False)

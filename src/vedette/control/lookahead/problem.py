@@ -266,4 +266,3 @@ class SequenceSearch(Protocol):
 
     def search(self, problem: SequenceProblem, *, rng: np.random.Generator) -> None:
         """Evaluate whole joint sequences, at least one, within the budget."""
-        ...

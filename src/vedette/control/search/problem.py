@@ -69,7 +69,6 @@ class JointSearch(Protocol):
 
     def search(self, problem: JointProblem, *, rng: np.random.Generator) -> tuple[int, ...]:
         """Return the joint action to take, one action per sensor, of equally good ones the first in printed order."""
-        ...
 
 
 def all_joint_actions(shape: tuple[int, ...]) -> Ints:
