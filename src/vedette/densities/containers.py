@@ -94,8 +94,8 @@ class Components(Container):
         return Mixture(found[0], found[1], found[2], Marks._make(found[3:]))  # faster than by star
 
 
-class MultiTarget(Container, TabularRepr):
-    """A density of a set of targets."""
+class Inspected(TabularRepr):
+    """Base of densities and estimates, whose targets are shown in words, as a table and as a drawing."""
 
     __slots__ = ()
     _weight: ClassVar[str] = "existence"  # name of the weights of `_targets`
@@ -123,6 +123,12 @@ class MultiTarget(Container, TabularRepr):
 
     def _detail(self) -> str:
         return self._targets().in_words()
+
+
+class MultiTarget(Container, Inspected):
+    """A density of a set of targets."""
+
+    __slots__ = ()
 
     @abstractmethod
     def cardinality(self) -> Floats:
