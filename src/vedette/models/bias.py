@@ -13,7 +13,7 @@ from vedette.models.measurement import wrap_angles
 LEAST_RANGE = 1.0  # m; smallest range after a bias is subtracted or added
 
 
-@part("constant", "bias", bearing_deg="bearing", elevation_deg="elevation")
+@part(bearing_deg="bearing", elevation_deg="elevation")
 @dataclass(frozen=True, slots=True)
 class Bias:
     """Constant bias of the scans of a sensor: the reported minus the true value of each quantity.
