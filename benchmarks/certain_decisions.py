@@ -21,7 +21,7 @@ import numpy as np
 
 from vedette.control import JointPlanner, Plan
 from vedette.control.preparation import Preparation
-from vedette.control.search import JointProblem, all_joint_actions, first_best
+from vedette.control.search.problem import JointProblem, all_joint_actions, first_best
 from vedette.kernels.base.types import Floats, Ints
 from vedette.scenarios import Scenario, load_scenario
 from vedette.scenarios.build import build_experiment, build_planner

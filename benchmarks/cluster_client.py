@@ -27,7 +27,7 @@ from vedette.campaigns.codec import encode
 from vedette.campaigns.rows import row_of
 from vedette.campaigns.spec import spec_from_data
 from vedette.campaigns.tasks import CompletedRun, Task, TaskOutcome
-from vedette.evaluation.metrics import encode_metrics
+from vedette.evaluation.metrics.serialization import encode_metrics
 from vedette.evaluation.runs import measure_run, run_scenario
 from vedette.simulation.serialization import encode_timings
 

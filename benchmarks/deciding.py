@@ -34,7 +34,8 @@ from deciding_scenes import RULES, Scene, scenes, strategies
 from pages import write_between
 from timed_planner import Timed
 
-from vedette.evaluation.metrics import match_run, ospa_of_run
+from vedette.evaluation.metrics.matching import match_run
+from vedette.evaluation.metrics.point_ospa import ospa_of_run
 from vedette.evaluation.statistics import paired_difference, summarise
 from vedette.evaluation.tail_summary import summarise_tail, tail_header
 from vedette.internal.processes import end_with_parent

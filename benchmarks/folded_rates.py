@@ -19,7 +19,7 @@ from typing import Any
 import numpy as np
 from pages import table_of_scenes
 
-from vedette.evaluation.metrics import ospa_of_run
+from vedette.evaluation.metrics.point_ospa import ospa_of_run
 from vedette.kernels.base.types import Floats
 from vedette.scenarios import Scenario, parse_scenario
 from vedette.scenarios.build import build_experiment, build_planner

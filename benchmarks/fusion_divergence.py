@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from vedette.control import CauchySchwarzReward, RenyiReward
 from vedette.control.pseudo_posterior_rewards import PlainRewards, lay_out_rewards
-from vedette.control.search import all_joint_actions
+from vedette.control.search.problem import all_joint_actions
 from vedette.densities import GLMB, LMB, TrackTable, as_lmb
 from vedette.densities.batches import DensityBatch
 from vedette.divergence import cauchy_schwarz

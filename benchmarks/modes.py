@@ -27,7 +27,7 @@ import numpy as np
 
 from vedette import models
 from vedette.densities.estimates import Estimate, best_estimate
-from vedette.evaluation.metrics import ospa, ospa_of_run
+from vedette.evaluation.metrics.point_ospa import ospa, ospa_of_run
 from vedette.filters import FactoredGlmbFilter, Limits
 from vedette.kernels.base.types import Floats
 from vedette.scenarios import Scenario, list_builtin, parse_scenario

@@ -39,8 +39,7 @@ from vedette.control import (
 from vedette.control.evidence import Evidence
 from vedette.control.preparation import Preparation
 from vedette.control.problem import joint_problem
-from vedette.control.search import all_joint_actions
-from vedette.control.search.problem import RewardCache
+from vedette.control.search.problem import RewardCache, all_joint_actions
 from vedette.densities import LMB
 from vedette.filters import LmbFilter
 from vedette.fusion import ParallelUpdate

@@ -33,7 +33,7 @@ from vedette.campaigns.codec import encode
 from vedette.campaigns.database import Reader
 from vedette.campaigns.rows import row_of, verified
 from vedette.campaigns.spec import load_spec
-from vedette.evaluation.metrics import encode_metrics
+from vedette.evaluation.metrics.serialization import encode_metrics
 from vedette.evaluation.runs import measure_run, run_scenario
 from vedette.simulation.serialization import encode_timings
 

@@ -25,7 +25,7 @@ import numpy as np
 from pages import write_between
 
 from vedette.control import MaxActive, Plan
-from vedette.evaluation.metrics import ospa_of_run
+from vedette.evaluation.metrics.point_ospa import ospa_of_run
 from vedette.kernels.base.types import Bools, Floats
 from vedette.scenarios import Scenario, load_scenario, replace_fields
 from vedette.scenarios.build import build_experiment, build_planner

@@ -34,7 +34,8 @@ from vedette.campaigns.results import open_results
 from vedette.campaigns.rows import pack, row_of, unpack
 from vedette.campaigns.spec import spec_from_data
 from vedette.campaigns.store import Store
-from vedette.evaluation.metrics import RunMetrics, decode_metrics, encode_metrics, measure
+from vedette.evaluation.metrics.run import RunMetrics, measure
+from vedette.evaluation.metrics.serialization import decode_metrics, encode_metrics
 from vedette.evaluation.runs import run_scenario
 from vedette.internal.files import sync_folder
 from vedette.scenarios import load_scenario

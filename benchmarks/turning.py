@@ -26,7 +26,7 @@ import numpy as np
 from hand_rules import RULES
 from pages import write_between
 
-from vedette.evaluation.metrics import ospa_of_run
+from vedette.evaluation.metrics.point_ospa import ospa_of_run
 from vedette.kernels.base.types import Floats
 from vedette.scenarios import Scenario, parse_scenario
 from vedette.scenarios.build import build_experiment, build_planner

@@ -7,9 +7,11 @@ types and constants, which have none.
 
 from __future__ import annotations
 
+import ast
 import importlib
 import inspect
 import re
+import textwrap
 from types import FunctionType
 from typing import Any
 
@@ -95,10 +97,11 @@ def members(protocol: type) -> list[str]:
     for base in reversed(protocol.__mro__):
         if not is_protocol(base):
             continue
-        found |= {name: f"{name}: {kind}" for name, kind in vars(base).get("__annotations__", {}).items()}
+        stated = [item for item in _definition(base).body if isinstance(item, ast.AnnAssign)]
+        found |= {line.partition(":")[0]: line for item in stated if (line := ast.unparse(item))}
         for name, member in vars(base).items():
             if isinstance(member, property) and member.fget is not None:
-                found[name] = f"{name}: {inspect.signature(member.fget).return_annotation}"
+                found[name] = f"{name}: {ast.unparse(_definition(member.fget).returns)}"
             elif isinstance(member, FunctionType) and (not name.startswith("_") or name == "__call__"):
                 found[name] = _method(name, member)
     return list(found.values())
@@ -106,9 +109,18 @@ def members(protocol: type) -> list[str]:
 
 def _method(name: str, function: FunctionType) -> str:
     """Return `def name(...) -> ...: ...`, with one argument per line if it is long."""
-    line = f"def {name}{inspect.signature(function)}: ...".replace("'", "")
+    given, node = inspect.signature(function), _definition(function)
+    stated = {own.arg: ast.unparse(own.annotation) for own in ast.walk(node.args) if getattr(own, "annotation", None)}
+    parameters = [own.replace(annotation=stated.get(own.name, own.annotation)) for own in given.parameters.values()]
+    line = f"def {name}{given.replace(parameters=parameters, return_annotation=ast.unparse(node.returns))}: ..."
+    line = line.replace("'", "")
     if len(line) <= 88:
         return line
     head, _, result = line.removeprefix(f"def {name}(").rpartition(") -> ")
     arguments = re.split(r", (?![^\[]*\])", head)
     return "\n".join([f"def {name}(", *(f"    {argument}," for argument in arguments), f") -> {result}"])
+
+
+def _definition(thing: Any) -> Any:
+    """Return the syntax tree of a class or function: its annotations as they are in the source."""
+    return ast.parse(textwrap.dedent(inspect.getsource(thing))).body[0]

@@ -1,7 +1,5 @@
 """The program: it imports the command line where Ctrl-C is already told in a word."""
 
-from __future__ import annotations
-
 import signal
 import sys
 from types import FrameType

@@ -1,7 +1,5 @@
 """The errors that this library raises. Each message names the field, what was expected and what came."""
 
-from __future__ import annotations
-
 _MOST_LINES, _LONGEST_LINE = 50, 2000
 
 

@@ -11,7 +11,8 @@ from vedette.campaigns.codec import encode
 from vedette.campaigns.rows import row_of
 from vedette.campaigns.spec import spec_from_data
 from vedette.campaigns.store import Store
-from vedette.evaluation.metrics import RunMetrics, encode_metrics, measure
+from vedette.evaluation.metrics.run import RunMetrics, measure
+from vedette.evaluation.metrics.serialization import encode_metrics
 from vedette.simulation.records import RunRecord
 from vedette.simulation.serialization import encode_timings
 

@@ -14,7 +14,8 @@ from vedette.campaigns.codec import encode
 from vedette.campaigns.rows import row_of
 from vedette.campaigns.running import NullObserver
 from vedette.campaigns.tasks import CompletedRun, Task, TaskOutcome
-from vedette.evaluation.metrics import RunMetrics, encode_metrics
+from vedette.evaluation.metrics.run import RunMetrics
+from vedette.evaluation.metrics.serialization import encode_metrics
 from vedette.simulation.records import RunRecord
 from vedette.simulation.serialization import encode_timings
 

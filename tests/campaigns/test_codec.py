@@ -20,7 +20,7 @@ from vedette.campaigns.codec import decode, encode
 from vedette.control.plan import Plan
 from vedette.densities.estimates import Estimate
 from vedette.errors import InputError
-from vedette.evaluation.metrics import decode_metrics, encode_metrics
+from vedette.evaluation.metrics.serialization import decode_metrics, encode_metrics
 from vedette.platforms import Actions
 from vedette.simulation.arrow import read_table, write_table
 from vedette.simulation.serialization import FORMAT_VERSION, decode_timings, encode_timings

@@ -14,7 +14,8 @@ from vedette.campaigns.codec import decode
 from vedette.campaigns.rows import row_of, unpack
 from vedette.campaigns.tasks import MIN_TASK_SECONDS, CompletedRun, FailedRun, Task, TaskQueue, perform
 from vedette.errors import ModelError, VedetteError
-from vedette.evaluation.metrics import decode_metrics, measure
+from vedette.evaluation.metrics.run import measure
+from vedette.evaluation.metrics.serialization import decode_metrics
 from vedette.evaluation.runs import run_scenario
 
 

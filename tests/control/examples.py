@@ -23,7 +23,7 @@ from vedette.control import (
 from vedette.control.additive.rewards import AdditiveRewards
 from vedette.control.inputs import options_of
 from vedette.control.pseudo_posterior_rewards import PseudoPosteriorRewards
-from vedette.control.search import all_joint_actions
+from vedette.control.search.problem import all_joint_actions
 from vedette.densities import GLMB, LMB, TrackTable
 from vedette.filters import DeltaGlmbFilter, LmbFilter
 from vedette.fusion import Clmb, CmDeltaGlmb

@@ -32,15 +32,15 @@ from vedette import models
 from vedette.control import CauchySchwarzReward, Evaluator, RenyiReward
 from vedette.control.problem import label_upper_bounds
 from vedette.control.pseudo_updates import draw_futures
-from vedette.control.rewards import (
+from vedette.control.rewards.base import reward_value
+from vedette.control.rewards.labels import (
     CardinalityVarianceReward,
     ExpectedGospaReward,
-    ExpectedLossReward,
     KullbackLeiblerReward,
     PeecsReward,
 )
-from vedette.control.rewards.base import reward_value
-from vedette.control.search import all_joint_actions
+from vedette.control.rewards.power import ExpectedLossReward
+from vedette.control.search.problem import all_joint_actions
 from vedette.densities import LMB, UndetectedIntensity
 from vedette.densities.tracks import single_gaussians
 from vedette.fusion import ParallelUpdate

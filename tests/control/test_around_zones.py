@@ -23,7 +23,7 @@ from vedette.control import (
     StayInside,
     ZoneConstraint,
 )
-from vedette.control.constraints import visibility_graph
+from vedette.control.constraints.paths import visibility_graph
 from vedette.control.cost_to_go import CostToGo, attracting_targets
 from vedette.control.inputs import options_of
 from vedette.densities import LMB

@@ -11,7 +11,7 @@ import pytest
 from vedette.control.additive.rewards import AdditiveRewards
 from vedette.control.problem import label_upper_bounds
 from vedette.control.rewards.labels import cardinality_variance_of_label
-from vedette.control.search import all_joint_actions
+from vedette.control.search.problem import all_joint_actions
 from vedette.densities.checks import offsets_of
 from vedette.kernels.base.types import Floats
 from vedette.kernels.planning.ascent import Cells

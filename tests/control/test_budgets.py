@@ -12,7 +12,7 @@ from control.examples import Situation, decided
 from control.test_additive import shared
 from control.test_switched import REWARDS
 from vedette.control import IndependentPlanner, JointPlanner
-from vedette.control.constraints import MaxActive
+from vedette.control.constraints.active import MaxActive
 from vedette.control.inputs import options_of, stationary_courses
 from vedette.errors import InputError, ScenarioError
 from vedette.evaluation.runs import run_scenario

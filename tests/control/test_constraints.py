@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 
 from vedette import models
 from vedette.control import Constraint, ConstraintContext, KeepOut, Mask, Separation, StayInside, feasible_action_mask
-from vedette.control.search import all_joint_actions
+from vedette.control.search.problem import all_joint_actions
 from vedette.densities import LMB
 from vedette.errors import InputError
 

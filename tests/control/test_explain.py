@@ -35,15 +35,14 @@ from vedette.control import (
 )
 from vedette.control.additive.rewards import AdditiveRewards
 from vedette.control.contributions import contributions_of
-from vedette.control.rewards import (
+from vedette.control.rewards.labels import (
     CardinalityVarianceReward,
     ExpectedGospaReward,
-    ExpectedLossReward,
     KullbackLeiblerReward,
     PeecsReward,
-    RenyiReward,
 )
-from vedette.control.search import all_joint_actions
+from vedette.control.rewards.power import ExpectedLossReward, RenyiReward
+from vedette.control.search.problem import all_joint_actions
 from vedette.densities import LMB
 from vedette.errors import InputError
 from vedette.kernels.planning.ascent import Cells

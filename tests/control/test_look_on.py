@@ -22,14 +22,14 @@ from vedette.control import (
     MobileSensor,
     Plan,
 )
-from vedette.control.constraints import visibility_graph
+from vedette.control.constraints.paths import visibility_graph
 from vedette.control.cost_to_go import CostToGo, attracting_targets
 from vedette.control.evaluator import mean_over_horizons
 from vedette.control.evidence import Evidence
 from vedette.control.extrapolation import extrapolated
 from vedette.control.inputs import options_of
 from vedette.control.problem import upper_bound
-from vedette.control.search import all_joint_actions
+from vedette.control.search.problem import all_joint_actions
 from vedette.densities import LMB, UndetectedIntensity
 from vedette.filters import LmbFilter
 from vedette.fusion import ParallelUpdate

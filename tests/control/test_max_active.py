@@ -22,17 +22,14 @@ from vedette.control import (
     Separation,
 )
 from vedette.control.baselines import ConstantPlanner
-from vedette.control.constraints import Active, Mask, nearest_feasible, relaxed
+from vedette.control.constraints.active import Active
+from vedette.control.constraints.mask import Mask, nearest_feasible, relaxed
 from vedette.control.inputs import mask_of_decision, options_of
-from vedette.control.rewards import CauchySchwarzReward, ExpectedLossReward
+from vedette.control.rewards.power import CauchySchwarzReward, ExpectedLossReward
 from vedette.control.rules_of_thumb import RulePlanner
-from vedette.control.search import (
-    CrossEntropy,
-    ExhaustiveSearch,
-    JointProblem,
-    SequentialGreedy,
-    all_joint_actions,
-)
+from vedette.control.search.cross_entropy import CrossEntropy
+from vedette.control.search.greedy import SequentialGreedy
+from vedette.control.search.problem import ExhaustiveSearch, JointProblem, all_joint_actions
 from vedette.platforms import Actions
 
 LOSS = ExpectedLossReward(60.0)

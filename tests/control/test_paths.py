@@ -11,7 +11,7 @@ import pytest
 
 from reference.shortest_paths import forbidden, nearest_free, path_length
 from vedette.control import KeepOut, StayInside
-from vedette.control.constraints import Paths, VisibilityGraph, visibility_graph
+from vedette.control.constraints.paths import Paths, VisibilityGraph, visibility_graph
 from vedette.models import Region
 
 CLOSE = 0.02  # m; paths keep 1 mm from corners

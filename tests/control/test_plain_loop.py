@@ -28,7 +28,7 @@ from control.plain_loop import plain_rewards
 from vedette import models
 from vedette.control import CauchySchwarzReward, RenyiReward
 from vedette.control.pseudo_posterior_rewards import PlainRewards
-from vedette.control.search import all_joint_actions
+from vedette.control.search.problem import all_joint_actions
 from vedette.densities import GLMB, LMB
 from vedette.fusion import Clmb, CmDeltaGlmb, FusionLimits
 from vedette.platforms import HeadingPlatform

@@ -19,7 +19,7 @@ from vedette.control import (
     JointPlanner,
     SequentialGreedy,
 )
-from vedette.control.constraints import Mask
+from vedette.control.constraints.mask import Mask
 from vedette.control.inputs import options_of, stationary_courses
 from vedette.platforms import GridPlatform, HeadingPlatform, MountedPlatform, Pointing, options_at
 

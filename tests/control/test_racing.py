@@ -19,7 +19,7 @@ from vedette.control import (
 )
 from vedette.control.preparation import Preparation
 from vedette.control.racing import FIRST_ROUND, Race, next_total
-from vedette.control.search import all_joint_actions
+from vedette.control.search.problem import all_joint_actions
 from vedette.platforms import HeadingPlatform
 
 REWARD = CauchySchwarzReward("reference")

@@ -9,7 +9,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from vedette.control.constraints import ConstraintContext, Revisit
+from vedette.control.constraints.protocol import ConstraintContext
+from vedette.control.constraints.revisit import Revisit
 from vedette.densities import LMB, as_lmb, track_moments
 from vedette.errors import InputError, ScenarioError
 from vedette.evaluation.runs import run_scenario

@@ -30,8 +30,8 @@ from vedette.control import (
     JointPlanner,
     PlanningSettings,
 )
-from vedette.control.rewards import ExpectedLossReward
-from vedette.control.search import all_joint_actions
+from vedette.control.rewards.power import ExpectedLossReward
+from vedette.control.search.problem import all_joint_actions
 from vedette.densities import UndetectedIntensity
 from vedette.errors import InputError
 from vedette.fusion import ParallelUpdate

@@ -27,7 +27,7 @@ from vedette.control import (
     Plan,
     evidence,
 )
-from vedette.control.search import all_joint_actions, first_best
+from vedette.control.search.problem import all_joint_actions, first_best
 from vedette.errors import InputError
 from vedette.platforms import HeadingPlatform
 

@@ -21,7 +21,7 @@ from vedette.control import (
     Mask,
     SequentialGreedy,
 )
-from vedette.control.search import all_joint_actions
+from vedette.control.search.problem import all_joint_actions
 from vedette.errors import InputError
 
 Joint = tuple[int, ...]

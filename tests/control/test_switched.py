@@ -24,8 +24,10 @@ from control.examples import (
 from control.test_additive import shared, single
 from vedette.control import CoordinateAscent, HorizonPlanner, IndependentPlanner, JointPlanner
 from vedette.control.inputs import options_of
-from vedette.control.rewards import CauchySchwarzReward, ExpectedLossReward, PeecsReward
-from vedette.control.search import SequentialGreedy, all_joint_actions
+from vedette.control.rewards.labels import PeecsReward
+from vedette.control.rewards.power import CauchySchwarzReward, ExpectedLossReward
+from vedette.control.search.greedy import SequentialGreedy
+from vedette.control.search.problem import all_joint_actions
 from vedette.errors import InputError
 from vedette.platforms import Actions, GridPlatform, HeadingPlatform, MountedPlatform, Operated, Pointing, Sequences
 from vedette.platforms.base import options_at

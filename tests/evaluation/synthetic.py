@@ -9,7 +9,7 @@ import numpy as np
 
 from vedette.control.plan import Plan, RewardTable
 from vedette.densities.estimates import Estimate
-from vedette.evaluation.metrics import ospa_of_run
+from vedette.evaluation.metrics.point_ospa import ospa_of_run
 from vedette.evaluation.rewards import MeanRewards, mean_rewards
 from vedette.kernels.base.types import Floats
 from vedette.platforms import Actions

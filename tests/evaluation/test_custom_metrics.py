@@ -23,7 +23,9 @@ from vedette.campaigns.running import run_campaign
 from vedette.campaigns.spec import spec_from_data
 from vedette.campaigns.store import Store
 from vedette.errors import InputError, VedetteError
-from vedette.evaluation.metrics import Metric, decode_metrics, encode_metrics, measure, serialization
+from vedette.evaluation.metrics import serialization
+from vedette.evaluation.metrics.run import Metric, measure
+from vedette.evaluation.metrics.serialization import decode_metrics, encode_metrics
 from vedette.reports import write_report
 from vedette.reports.groups import comparison_groups
 from vedette.reports.saving import write_summary

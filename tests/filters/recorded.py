@@ -19,7 +19,7 @@ import numpy as np
 
 from vedette import models
 from vedette.densities import GLMB, LMB, Estimate, map_estimate
-from vedette.evaluation.metrics import ospa
+from vedette.evaluation.metrics.point_ospa import ospa
 from vedette.filters import Filter, LmbFilter
 from vedette.fusion import Fusion
 

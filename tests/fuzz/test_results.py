@@ -31,7 +31,8 @@ from vedette.campaigns.store import Store
 from vedette.cli import app
 from vedette.densities.files import load_density, save_density
 from vedette.errors import VedetteError
-from vedette.evaluation.metrics import encode_metrics, measure
+from vedette.evaluation.metrics.run import measure
+from vedette.evaluation.metrics.serialization import encode_metrics
 from vedette.reports import write_figures, write_report
 from vedette.simulation.serialization import encode_timings
 from vedette.simulation.storage import load_run, read_manifest, save_run

@@ -14,7 +14,7 @@ import pytest
 
 from vedette.calibration import calibrate
 from vedette.errors import InputError, ScenarioError
-from vedette.evaluation.metrics import ospa_of_run
+from vedette.evaluation.metrics.point_ospa import ospa_of_run
 from vedette.evaluation.scans import scan_table
 from vedette.kernels.base.types import OWN_VELOCITY
 from vedette.live import build_live_loop

@@ -1,7 +1,5 @@
 """Time-varying biases: estimated per window of a recording, or online from incoming scans."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace

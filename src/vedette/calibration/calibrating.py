@@ -1,7 +1,5 @@
 """Maximum likelihood calibration of the sensors of a recording: initial guess, maximum, identifiability."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import replace

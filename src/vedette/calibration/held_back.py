@@ -1,7 +1,5 @@
 """Fit of estimates to scans that they were not made from, by blocks of time."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

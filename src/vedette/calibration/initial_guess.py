@@ -1,7 +1,5 @@
 """Initial guess for calibration: biases and noise that fit the matched measurements of tracks."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Sequence
 from typing import NamedTuple

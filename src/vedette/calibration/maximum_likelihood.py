@@ -5,8 +5,6 @@ those of the terms' scores (Berndt, Hall, Hall, Hausman 1974). Steps that contin
 differences with the curvature known, at half the cost. A short last step needs none.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple

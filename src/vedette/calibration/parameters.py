@@ -1,7 +1,5 @@
 """Sensor parameters to be estimated from a recording, and the likelihood of the recording given their values."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace

@@ -4,8 +4,6 @@ Biases and straight pieces of the tracks are fitted jointly to the matched measu
 weights. Noise, detection and clutter then follow from the residuals and the unmatched measurements.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from typing import NamedTuple

@@ -4,8 +4,6 @@ Each scene has a folder with a results folder of the library's own strategies an
 seed and runs, so that they are paired. Entrants, scenes and runs may be added at any time.
 """
 
-from __future__ import annotations
-
 import re
 import shlex
 import shutil

@@ -1,7 +1,5 @@
 """Cells of a campaign, each one strategy in one setting, and their construction from a specification."""
 
-from __future__ import annotations
-
 import hashlib
 import json
 import re
@@ -114,7 +112,7 @@ class Campaign(SummaryRepr):
             groups.setdefault(json.dumps(shared, sort_keys=True), []).append(cell)
         return tuple(tuple(cells) for cells in groups.values())
 
-    def with_runs(self, num_runs: int) -> Campaign:
+    def with_runs(self, num_runs: int) -> "Campaign":
         """Return the campaign with another number of runs. Raises `InputError` for an invalid number."""
         spec_from_data({**self.spec, "runs": num_runs})
         return replace(self, num_runs=num_runs, spec={**self.spec, "runs": num_runs})

@@ -4,8 +4,6 @@ The bytes are an uncompressed zip archive of the Arrow files of a saved run (`ve
 `run.json`, which identifies the run. They depend only on the numbers in the run.
 """
 
-from __future__ import annotations
-
 import io
 import json
 import zipfile

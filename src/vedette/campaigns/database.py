@@ -3,8 +3,6 @@
 It uses a rollback journal, not a write-ahead log: see docs/decisions/0004-results-store.md.
 """
 
-from __future__ import annotations
-
 import sqlite3
 from collections.abc import Iterator, Sequence
 from contextlib import closing, contextmanager

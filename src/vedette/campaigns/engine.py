@@ -1,7 +1,5 @@
 """Execution of tasks: in this process, or by workers."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Iterator
 from typing import Protocol
@@ -18,11 +16,9 @@ class Workers(Protocol):
 
     def room(self) -> int:
         """Return how many tasks may be in progress, so that no worker idles while results travel."""
-        ...
 
     def submit(self, task: Task) -> None:
         """Hand out a task."""
-        ...
 
     def next(self) -> list[tuple[Task, TaskOutcome | WorkerDied]]:
         """Return the tasks that have ended, with their outcomes. Waits for at least one.
@@ -31,7 +27,6 @@ class Workers(Protocol):
 
         Raises `VedetteError` if no worker is left, or a worker has another version.
         """
-        ...
 
 
 def in_process(queue: TaskQueue) -> Iterator[TaskOutcome]:

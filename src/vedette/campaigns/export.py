@@ -1,7 +1,5 @@
 """Export of the results of a campaign or a single run to files of other tools: Parquet, CSV, NetCDF."""
 
-from __future__ import annotations
-
 import tempfile
 from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Writer of the runs of a campaign: one row per run in the SQLite file, each written atomically."""
 
-from __future__ import annotations
-
 import sqlite3
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import suppress

@@ -1,7 +1,5 @@
 """Leaderboard of a benchmark: entrants and the library's own strategies on each scene, and tables of them."""
 
-from __future__ import annotations
-
 import csv
 import hashlib
 import io

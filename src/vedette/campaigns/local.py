@@ -1,7 +1,5 @@
 """Workers on this machine: processes of the standard library's pools."""
 
-from __future__ import annotations
-
 import os
 import signal
 import time
@@ -26,7 +24,7 @@ _FILES, _FILES_A_WORKER = 40, 10  # open files, with a margin: measured 16 with 
 
 
 @contextmanager
-def local_workers(num_workers: int, tell: Callable[[str], None]) -> Iterator[LocalWorkers]:
+def local_workers(num_workers: int, tell: Callable[[str], None]) -> "Iterator[LocalWorkers]":
     """Context manager with `num_workers` worker processes on this machine. One that dies is replaced.
 
     tell: receives messages about workers that died.
@@ -74,7 +72,7 @@ class _Worker:
     tasks: dict[Future[TaskOutcome], Task] = field(default_factory=dict)  # in order of execution
 
     @classmethod
-    def start(cls) -> _Worker:
+    def start(cls) -> "_Worker":
         pool = ProcessPoolExecutor(1, context(), initializer=_initialise_worker)
         others = set(active_children())
         try:

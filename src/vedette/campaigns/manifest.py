@@ -1,7 +1,5 @@
 """Manifest of a results folder: the campaign as data, and the sessions of work on it."""
 
-from __future__ import annotations
-
 import hashlib
 import json
 import os

@@ -1,7 +1,5 @@
 """Merges the results folders of the shards of one campaign."""
 
-from __future__ import annotations
-
 from collections import defaultdict
 from collections.abc import Callable, Sequence
 from contextlib import suppress

@@ -1,7 +1,5 @@
 """Published comparisons that come with the library: campaigns on published scenes, with their figures and claims."""
 
-from __future__ import annotations
-
 import tomllib
 from collections.abc import Iterator
 from dataclasses import dataclass

@@ -21,7 +21,8 @@ from vedette.campaigns.tables import FinishedRun, concatenated_tables, tables_of
 from vedette.errors import InputError
 from vedette.evaluation.comparison import Comparison, compare_scored_scans
 from vedette.evaluation.ensembles import Ensemble
-from vedette.evaluation.metrics import Metric, RunMetrics, decode_metrics
+from vedette.evaluation.metrics.run import Metric, RunMetrics
+from vedette.evaluation.metrics.serialization import decode_metrics
 from vedette.evaluation.runs import measure_run
 from vedette.internal.representation import SummaryRepr
 from vedette.internal.text import elided, pluralise, shown

@@ -3,8 +3,6 @@
 Every row carries checksums of its unpacked parts, which also cover its cell and run number.
 """
 
-from __future__ import annotations
-
 import hashlib
 from dataclasses import dataclass
 from typing import Any, NamedTuple

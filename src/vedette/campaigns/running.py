@@ -1,7 +1,5 @@
 """A whole campaign: executes the missing runs, stores each atomically, and writes the tables last."""
 
-from __future__ import annotations
-
 from collections.abc import Generator
 from contextlib import closing
 from dataclasses import dataclass
@@ -20,7 +18,7 @@ from vedette.campaigns.store import Store
 from vedette.campaigns.tasks import CompletedRun, FailedRun, TaskQueue
 from vedette.campaigns.tasks import TaskOutcome as Done
 from vedette.errors import InputError, VedetteError
-from vedette.evaluation.metrics import encode_metrics
+from vedette.evaluation.metrics.serialization import encode_metrics
 from vedette.evaluation.runs import custom_metrics
 from vedette.internal.extras import require_packages
 from vedette.internal.files import sweep

@@ -1,7 +1,5 @@
 """Scores of the strategies of a campaign: error, tracked share and computation time, as a table."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

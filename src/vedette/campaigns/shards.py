@@ -1,7 +1,5 @@
 """Shards: independent shares of the runs of a campaign, and their folders."""
 
-from __future__ import annotations
-
 import math
 import re
 from collections.abc import Collection, Sequence

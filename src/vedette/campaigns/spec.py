@@ -1,7 +1,5 @@
 """Specification of a campaign as data, read from TOML or made in Python."""
 
-from __future__ import annotations
-
 import itertools
 import math
 import os

@@ -4,8 +4,6 @@ The folder contains `manifest.json` (the campaign as data, and its sessions with
 `campaign.sqlite` (the finished runs). Read it with `vedette.campaigns.results.open_results`.
 """
 
-from __future__ import annotations
-
 from collections.abc import Collection, Mapping
 from pathlib import Path
 from types import TracebackType
@@ -25,7 +23,7 @@ from vedette.campaigns.manifest import (
 )
 from vedette.campaigns.rows import Row
 from vedette.errors import InputError
-from vedette.evaluation.metrics import has_metrics
+from vedette.evaluation.metrics.serialization import has_metrics
 
 
 class Store(Writer):
@@ -43,7 +41,7 @@ class Store(Writer):
         self._sessions: list[dict[str, Any]] = manifest["sessions"]
 
     @classmethod
-    def open(cls, folder: Path | str, campaign: Campaign) -> Store:
+    def open(cls, folder: Path | str, campaign: Campaign) -> "Store":
         """Create the folder, or continue with it.
 
         A campaign may continue with a larger number of runs. A smaller number does not reduce it.
@@ -118,7 +116,7 @@ class Store(Writer):
             self.open_runs(contents)
         return manifest
 
-    def __enter__(self) -> Store:
+    def __enter__(self) -> "Store":
         return self
 
     def __exit__(

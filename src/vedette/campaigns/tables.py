@@ -6,8 +6,6 @@ and in the metadata of its field. Null means that a metric has no value. A `step
 decision it is the scan that it followed.
 """
 
-from __future__ import annotations
-
 import json
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -17,7 +15,7 @@ import numpy as np
 import pyarrow as pa
 
 from vedette.campaigns.cells import Campaign, Cell
-from vedette.evaluation.metrics import RunMetrics
+from vedette.evaluation.metrics.run import RunMetrics
 from vedette.simulation.arrow import Columns, Kind, Layout, stacked, to_arrow
 from vedette.simulation.records import OSPA_COLUMNS, RunRecord
 from vedette.simulation.tables import (

@@ -1,7 +1,5 @@
 """Tasks of a campaign: the unit of work of a worker, its outcome, and the order of tasks."""
 
-from __future__ import annotations
-
 import heapq
 import math
 import time
@@ -14,7 +12,7 @@ from vedette.campaigns.cells import Campaign, Cell
 from vedette.campaigns.codec import encode
 from vedette.campaigns.rows import Row, row_of
 from vedette.errors import VedetteError
-from vedette.evaluation.metrics import encode_metrics
+from vedette.evaluation.metrics.serialization import encode_metrics
 from vedette.evaluation.runs import custom_metrics, measure_run, run_scenario
 from vedette.scenarios.sections.planners import STRATEGIES
 from vedette.simulation.serialization import encode_timings
@@ -39,7 +37,7 @@ class Task:
     runs: tuple[int, ...]
     versions: Mapping[str, str]
 
-    def alone(self) -> Iterator[Task]:
+    def alone(self) -> "Iterator[Task]":
         """Yield one task for each run."""
         return (replace(self, runs=(run,)) for run in self.runs)
 

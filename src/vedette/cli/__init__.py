@@ -1,7 +1,5 @@
 """The command line: a thin layer over the library. Each command imports what it needs when it runs."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Annotated
 

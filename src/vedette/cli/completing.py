@@ -3,8 +3,6 @@
 A scenario is read only to complete its own strategies. Completion never raises an error.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from pathlib import Path
 

@@ -3,8 +3,6 @@
 0: done. 1: faulty content (a scenario, a file, a computation). 2: wrong use of the command line. 130: interrupted.
 """
 
-from __future__ import annotations
-
 import re
 import sys
 from collections.abc import Iterator, Mapping

@@ -1,7 +1,5 @@
 """Picture of a scenario: region, true tracks, sensors and birth sites (paper Fig. 2)."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

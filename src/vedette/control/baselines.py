@@ -1,13 +1,13 @@
 """The planner protocol, planners without rewards (random, fixed), and a wrapper that reports violations."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field, replace
 from typing import Any, ClassVar, Protocol, runtime_checkable
 
 import numpy as np
 
-from vedette.control.constraints import Constraint, ConstraintContext, nearest_feasible, violation_notes
+from vedette.control.constraints.mask import nearest_feasible
+from vedette.control.constraints.masks import violation_notes
+from vedette.control.constraints.protocol import Constraint, ConstraintContext
 from vedette.control.inputs import check_control_inputs, check_poses, mask_of_decision, options_of, predicted_beliefs
 from vedette.control.plan import Plan
 from vedette.control.settings import MobileSensor, PlanningSettings
@@ -25,11 +25,9 @@ class Planner(Protocol):
     @property
     def name(self) -> str:
         """Name of the strategy, as in `Plan.planner`."""
-        ...
 
     def plan(self, state: State, poses: Floats, *, rng: np.random.Generator) -> Plan:
         """Return the plan for the state of a tracker after a scan and the sensor poses (num_sensors, 3 or more)."""
-        ...
 
 
 @runtime_checkable
@@ -38,7 +36,6 @@ class RequiresTruth(Protocol):
 
     def with_truth(self, truth: Any) -> Planner:
         """Return the planner for these targets, a `vedette.simulation.Truth`."""
-        ...
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -135,7 +132,7 @@ class ConstraintReportingPlanner:
         """Name of the planner."""
         return self.planner.name
 
-    def with_truth(self, truth: Any) -> ConstraintReportingPlanner:
+    def with_truth(self, truth: Any) -> "ConstraintReportingPlanner":
         """Return this planner with the true targets, if the wrapped planner requires them."""
         planner = self.planner
         return replace(self, planner=planner.with_truth(truth)) if isinstance(planner, RequiresTruth) else self

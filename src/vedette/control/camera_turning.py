@@ -1,7 +1,5 @@
 """Time that cameras need to turn to targets, and how they turn beyond their horizon."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Contributions of targets and sensors to the reward of a joint action, for rewards that are sums over labels."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

@@ -5,8 +5,6 @@ Distributed Reinforcement Learning, 2020). The policy goes to one target by the 
 where it will be then, and follows it.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -14,7 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from vedette.control.camera_turning import seconds_to_search, seconds_to_turn, turn_rate
-from vedette.control.constraints import Paths, VisibilityGraph
+from vedette.control.constraints.paths import Paths, VisibilityGraph
 from vedette.control.extrapolation import extrapolated, walked
 from vedette.control.settings import MobileSensor, PlanningSettings
 from vedette.densities import LMB, UndetectedIntensity
@@ -66,7 +64,7 @@ class CostToGo:
         places: Floats,
         graph: VisibilityGraph,
         undetected: UndetectedIntensity | None,
-    ) -> CostToGo:
+    ) -> "CostToGo":
         """Return the data for these targets. graph: of the zones that constraints forbid."""
         reaches = np.array([detection_range(sensor, own.pose) for sensor, own in zip(sensors, options, strict=True)])
         paths = tuple([graph.to(places, own.pose[:2]) for own in options])

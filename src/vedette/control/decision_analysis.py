@@ -1,7 +1,5 @@
 """Analysis of a decision after it was made, from its evidence."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field

@@ -1,7 +1,5 @@
 """Decisions: rewards on samples and a search over them, with rounds of fresh samples if a confidence is required."""
 
-from __future__ import annotations
-
 import math
 import time
 from collections.abc import Sequence
@@ -10,7 +8,7 @@ from typing import Any, Literal, TypeAlias
 
 import numpy as np
 
-from vedette.control.constraints import Mask
+from vedette.control.constraints.mask import Mask
 from vedette.control.decision_analysis import DecisionAnalysis
 from vedette.control.evaluator import Evaluator
 from vedette.control.evidence import Evidence, Part
@@ -20,7 +18,7 @@ from vedette.control.plan import Plan, RewardTable, SamplingOutcome
 from vedette.control.preparation import Preparation
 from vedette.control.problem import beyond_cutoff, searched, upper_bound
 from vedette.control.racing import FIRST_ROUND, Race, next_total
-from vedette.control.search import JointSearch, all_joint_actions, first_best
+from vedette.control.search.problem import JointSearch, all_joint_actions, first_best
 from vedette.kernels.base.types import Floats, Ints
 from vedette.platforms import Actions, Options
 
@@ -82,7 +80,7 @@ class Rounds:
         others: tuple[int, ...] | None = None,
         *,
         rng: np.random.Generator,
-    ) -> Rounds:
+    ) -> "Rounds":
         """Return rounds with an evaluator of all courses on `num_samples` samples."""
         deadline = Deadline(time.perf_counter(), preparation.settings.max_seconds)
         return cls(preparation, preparation.evaluator(num_samples, rng=rng), num_samples, rng, deadline, others)

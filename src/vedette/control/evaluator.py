@@ -1,7 +1,5 @@
 """The evaluator of all planners: expected rewards of actions, and the horizons that they cover."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
@@ -10,7 +8,7 @@ import numpy as np
 
 from vedette.control.additive.rewards import AdditiveRewards
 from vedette.control.additive.table import lay_out
-from vedette.control.constraints import VisibilityGraph, visibility_graph
+from vedette.control.constraints.paths import VisibilityGraph, visibility_graph
 from vedette.control.cost_to_go import CostToGo, attracting_targets
 from vedette.control.prediction import Prediction, predicted
 from vedette.control.pseudo_posterior_rewards import PseudoPosteriorRewards, SampleRewards
@@ -64,7 +62,7 @@ class Evaluator:
         state: State,
         *,
         rng: np.random.Generator,
-    ) -> Evaluator:
+    ) -> "Evaluator":
         """Return an evaluator by the sensors' own filters; raises as `JointPlanner.plan`."""
         motion = sensors[0].filter.targets.motion
         prediction: Any = predicted(state.fused, motion, settings.horizon_steps, settings.horizon_period)
@@ -84,7 +82,7 @@ class Evaluator:
         horizons: tuple[PlanningSettings, ...] | None = (),
         graph: VisibilityGraph | None = None,
         rng: np.random.Generator,
-    ) -> Evaluator:
+    ) -> "Evaluator":
         """Return an evaluator by sums over labels, each followed over every course that reaches it; beliefs are LMBs.
 
         horizons: further horizons at whose ends the expected loss is evaluated as well; None: those that are needed

@@ -1,7 +1,5 @@
 """The rewards on which a decision was made, as tables over the actions in printed order."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -221,12 +219,12 @@ class Part(NamedTuple):
     others: tuple[int, ...] | None = None  # courses that one sensor assumes for all; None: `additive` is its own
 
     @classmethod
-    def together(cls, evidence: Evidence, chosen: Sequence[int]) -> Part:
+    def together(cls, evidence: Evidence, chosen: Sequence[int]) -> "Part":
         """Return the decision of all sensors."""
         return cls(evidence, tuple(chosen), evidence.evaluator.additive)
 
     @classmethod
-    def alone(cls, evidence: Evidence, course: int, others: tuple[int, ...] | None = None) -> Part:
+    def alone(cls, evidence: Evidence, course: int, others: tuple[int, ...] | None = None) -> "Part":
         """Return the decision of the one sensor of the evidence. others: as in `Evaluator.alone`."""
         additive, (sensor,) = evidence.evaluator.additive, evidence.which
         own = additive if additive is None or others is not None else additive.alone(sensor)

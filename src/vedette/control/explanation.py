@@ -1,7 +1,5 @@
 """Explanation of a plan: contributions of targets and sensors to its reward, and the margin to the runner-up."""
 
-from __future__ import annotations
-
 import math
 import textwrap
 from collections.abc import Callable, Sequence
@@ -154,7 +152,7 @@ class Explanation:
     )
 
     @classmethod
-    def nothing(cls, planner: str, chosen: tuple[str, ...], reason: str) -> Explanation:
+    def nothing(cls, planner: str, chosen: tuple[str, ...], reason: str) -> "Explanation":
         """Return the explanation of a plan that was not made on rewards."""
         nothing = (None,) * 7
         return cls(planner, chosen, None, None, 0, *nothing, dict.fromkeys(EXPLAINED, reason))
@@ -178,7 +176,7 @@ class Explanation:
             raise InputError(f"had: expected a plan as its planner returned it; {reason}")
         return self.answer(sensor, action, columns)
 
-    def without_evidence(self) -> Explanation:
+    def without_evidence(self) -> "Explanation":
         """Return a copy for storage, which cannot answer `counterfactual`."""
         values = {name: getattr(self, name) for name in self.__slots__ if name != "answer"}
         return Explanation(**values)

@@ -1,7 +1,5 @@
 """Continuation of courses beyond the horizon: straight on, or along a path."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from vedette.control.camera_turning import turned_on

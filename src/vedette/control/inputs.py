@@ -1,13 +1,13 @@
 """Validation of the inputs of planners, and the options of their sensors."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
-from vedette.control.constraints import Constraint, ConstraintContext, Mask, feasible_action_mask
+from vedette.control.constraints.mask import Mask
+from vedette.control.constraints.masks import feasible_action_mask
+from vedette.control.constraints.protocol import Constraint, ConstraintContext
 from vedette.control.prediction import predicted
 from vedette.control.rewards.base import LabelReward, PowerReward
 from vedette.control.rewards.power import ExpectedLossReward

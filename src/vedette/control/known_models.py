@@ -1,7 +1,5 @@
 """Inputs of a sensor's pseudo-updates besides its prior, with the closed forms of built-in models."""
 
-from __future__ import annotations
-
 import math
 from functools import lru_cache
 

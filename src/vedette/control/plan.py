@@ -1,7 +1,5 @@
 """The plan that a planner returns, with the evidence of the decision."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from typing import Any, Literal, NamedTuple
@@ -148,7 +146,7 @@ class Plan(TabularRepr):
             )
         return Explanation.nothing(self.planner, chosen, f"{self.planner} does not choose by rewards")
 
-    def without_evidence(self, *, explained: bool) -> Plan:
+    def without_evidence(self, *, explained: bool) -> "Plan":
         """Return the plan for storage, without its evidence, which takes memory. `explained`: with its explanation."""
         explanation = self.explanation
         if explained and self.analysis is not None:

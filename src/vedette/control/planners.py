@@ -1,19 +1,18 @@
 """Planners: joint and independent decision making (paper, Algorithms 2 and 3)."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 from typing import ClassVar
 
 import numpy as np
 
-from vedette.control.constraints import Constraint
+from vedette.control.constraints.protocol import Constraint
 from vedette.control.decisions import OthersAssumption, decide_independently, decide_jointly
 from vedette.control.inputs import check_control_inputs, check_reward_inputs
 from vedette.control.plan import Plan
 from vedette.control.preparation import AnyReward, Preparation
-from vedette.control.rewards import ExpectedLossReward
-from vedette.control.search import AutomaticSearch, JointSearch
+from vedette.control.rewards.power import ExpectedLossReward
+from vedette.control.search.ascent import AutomaticSearch
+from vedette.control.search.problem import JointSearch
 from vedette.control.settings import MobileSensor, PlanningSettings
 from vedette.fusion import Fusion
 from vedette.kernels.base.types import Floats

@@ -1,7 +1,5 @@
 """The fused density predicted to the end of the horizon, the starting point of every decision."""
 
-from __future__ import annotations
-
 from typing import NamedTuple, TypeVar
 
 from vedette.densities import LMB, LabelledDensity, track_moments
@@ -29,7 +27,7 @@ class Prediction(NamedTuple):
     end: LMB  # at the end of the horizon, one Gaussian per label
 
     @classmethod
-    def of(cls, fused: LMB, motion: MotionModel, num_steps: int, period: float) -> Prediction:
+    def of(cls, fused: LMB, motion: MotionModel, num_steps: int, period: float) -> "Prediction":
         """Return the prediction over `num_steps` steps of `period` seconds. Call it within `model_errors`."""
         tracks, logits = single_gaussians(fused.tracks).to_kernel(), fused.existence_logit
         own = kernel_motion(motion, ALWAYS_SURVIVES)

@@ -1,7 +1,5 @@
 """How a decision is evaluated: by sums over labels if beliefs, fusion and reward allow it, otherwise case by case."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
@@ -9,7 +7,9 @@ from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 
-from vedette.control.constraints import Constraint, Mask, VisibilityGraph, visibility_graph
+from vedette.control.constraints.mask import Mask
+from vedette.control.constraints.paths import VisibilityGraph, visibility_graph
+from vedette.control.constraints.protocol import Constraint
 from vedette.control.evaluator import Evaluator
 from vedette.control.inputs import check_state, mask_of_decision, options_of
 from vedette.control.plan import SamplingOutcome
@@ -83,7 +83,7 @@ class Preparation:
         state: State,
         poses: Any,
         constraints: Sequence[Constraint] = (),
-    ) -> Preparation:
+    ) -> "Preparation":
         """Return the preparation. Raises `InputError` for invalid inputs."""
         options = options_of(sensors, poses, settings)
         planned = planning_beliefs(sensors, fusion, settings, reward, state)

@@ -1,7 +1,5 @@
 """The search problem of a joint decision, and the upper bound on its reward."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
@@ -10,12 +8,12 @@ from functools import cache
 import numpy as np
 
 from vedette.control.additive.rewards import AdditiveRewards, value_found
-from vedette.control.constraints import Mask
+from vedette.control.constraints.mask import Mask
 from vedette.control.evaluator import Evaluator
 from vedette.control.evidence import Evidence
 from vedette.control.explanation import Bound
 from vedette.control.inputs import check_choice, compiled_mask, single_mask, stationary_courses
-from vedette.control.search import JointProblem, JointSearch, all_joint_actions, first_best
+from vedette.control.search.problem import JointProblem, JointSearch, all_joint_actions, first_best
 from vedette.densities.checks import offsets_of
 from vedette.internal.probabilities import expit
 from vedette.internal.threads import run_chunks

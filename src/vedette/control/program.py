@@ -1,7 +1,5 @@
 """A planner that is an external program, in any language, which answers a line of JSON per decision."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -9,7 +7,8 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from vedette.control.constraints import Constraint, Mask
+from vedette.control.constraints.mask import Mask
+from vedette.control.constraints.protocol import Constraint
 from vedette.control.inputs import check_control_inputs, check_poses, mask_of_decision, options_of, single_mask
 from vedette.control.plan import Plan
 from vedette.control.settings import MobileSensor, PlanningSettings

@@ -4,8 +4,6 @@ If fusion and reward allow it, the densities are precomputed and rewards are mad
 public functions are called for each joint action and sample.
 """
 
-from __future__ import annotations
-
 import functools
 import warnings
 from collections.abc import Callable, Sequence
@@ -76,7 +74,7 @@ class PseudoPosteriorRewards:
         prediction: Belief,
         *,
         rng: np.random.Generator,
-    ) -> PseudoPosteriorRewards:
+    ) -> "PseudoPosteriorRewards":
         """Draw the samples and run the pseudo-updates of every sensor (paper section III-B, steps 1 to 4)."""
         labels, futures = draw_futures(state.fused, sensors, settings, rng=rng)
         scans = scans_within(sensors, options, state.time, settings)

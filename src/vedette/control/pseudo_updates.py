@@ -6,8 +6,6 @@ these explain the measurements of other labels, which is often negligible: of th
 updates all of them does the same work six times.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

@@ -19,8 +19,6 @@ elimination and stopping conditions for the multi-armed bandit and reinforcement
 that is divided over rounds).
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass, field
 from typing import Literal
@@ -28,7 +26,7 @@ from typing import Literal
 import numpy as np
 
 from vedette.control.evidence import Evidence
-from vedette.control.search import first_best, tie_tolerance
+from vedette.control.search.problem import first_best, tie_tolerance
 from vedette.kernels.base.types import Bools, Floats, Ints
 
 # Samples of the first round, and the factor by which each round adds to them (costs: docs/evidence/planning.md).

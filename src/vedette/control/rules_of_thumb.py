@@ -1,17 +1,17 @@
 """Rules of thumb: sensors head for the estimated targets, without any reward, as manual control would."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 from typing import Literal, TypeAlias, get_args
 
 import numpy as np
 
-from vedette.control.constraints import Constraint, VisibilityGraph, nearest_feasible, visibility_graph
+from vedette.control.constraints.mask import nearest_feasible
+from vedette.control.constraints.paths import VisibilityGraph, visibility_graph
+from vedette.control.constraints.protocol import Constraint
 from vedette.control.cost_to_go import CostToGo
 from vedette.control.inputs import check_control_inputs, mask_of_decision, options_of, single_mask
 from vedette.control.plan import Plan
-from vedette.control.search import first_best
+from vedette.control.search.problem import first_best
 from vedette.control.settings import MobileSensor, PlanningSettings
 from vedette.densities import Estimator, best_estimate
 from vedette.kernels.base.types import HALF_WIDTH, POINTING, Floats, Ints

@@ -1,7 +1,5 @@
 """Samples of the fused density, and their trajectories over the horizon."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Settings of planners besides the models: the horizon, the number of samples, and limits on the work."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Literal, TypeAlias

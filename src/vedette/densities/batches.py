@@ -1,7 +1,5 @@
 """Batches of labelled densities on the same label sets, such as the possible posteriors of a sensor."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TypeAlias
@@ -56,14 +54,14 @@ class DensityBatch:
     @classmethod
     def of_glmbs(
         cls, sets: Sequence[LabelSet], log_weights: Floats, means: Floats, covs: Floats, **counts: int
-    ) -> DensityBatch:
+    ) -> "DensityBatch":
         """Return a batch of marginalised GLMBs on distinct label sets, log_weights (num_cases, num_sets)."""
         return cls(GLMB, ((),), np.array([0, len(sets)]), tuple(sets), log_weights, means, covs, **counts)
 
     @classmethod
     def of_lmbs(
         cls, labels: Sequence[Label], existence_logits: Floats, means: Floats, covs: Floats, **counts: int
-    ) -> DensityBatch:
+    ) -> "DensityBatch":
         """Return a batch of LMBs of these labels, existence_logits (num_cases, num_labels)."""
         log_weights = np.empty((len(existence_logits), 2 * len(labels)))
         log_weights[:, 0::2], log_weights[:, 1::2] = log_expit(-existence_logits), log_expit(existence_logits)
@@ -73,7 +71,7 @@ class DensityBatch:
         return cls(LMB, factors, offsets, sets, log_weights, means, covs, **counts)
 
     @classmethod
-    def of(cls, density: LabelledDensity) -> DensityBatch:
+    def of(cls, density: LabelledDensity) -> "DensityBatch":
         """Return a batch of one LMB or marginalised GLMB. Mixtures are replaced by one Gaussian of their moments."""
         tracks = single_gaussians(density.tracks).to_kernel()
         gaussians = tracks.components

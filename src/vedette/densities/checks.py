@@ -6,8 +6,6 @@ Faults of form (type, shape, order) raise `InputError`. Faults of value (not fin
 definite) raise the `error` given: `NumericalError` for the result of a computation, `InputError` for a user's data.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Any
 

@@ -4,8 +4,6 @@ Kernels use a density's offsets and indices without checks, so what was checked 
 one of the arrays later could make a kernel read memory that it does not own.
 """
 
-from __future__ import annotations
-
 from abc import abstractmethod
 from collections.abc import Callable
 from operator import attrgetter
@@ -102,8 +100,8 @@ class Components(Container):
         return Mixture._make(_COMPONENTS(self))
 
 
-class MultiTarget(Container, TabularRepr):
-    """A density of a set of targets."""
+class Inspected(TabularRepr):
+    """Base of densities and estimates, whose targets are shown in words, as a table and as a drawing."""
 
     __slots__ = ()
     _weight: ClassVar[str] = "existence"  # name of the weights of `_targets`
@@ -131,6 +129,12 @@ class MultiTarget(Container, TabularRepr):
 
     def _detail(self) -> str:
         return self._targets().in_words()
+
+
+class MultiTarget(Container, Inspected):
+    """A density of a set of targets."""
+
+    __slots__ = ()
 
     @abstractmethod
     def cardinality(self) -> Floats:

@@ -1,7 +1,5 @@
 """Estimates extracted from a density, and track histories under stable labels."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
@@ -10,7 +8,7 @@ from typing import Any, Protocol
 import numpy as np
 
 from vedette.densities import checks
-from vedette.densities.containers import for_kernel
+from vedette.densities.containers import Inspected, for_kernel
 from vedette.densities.conversions import resolve_labels
 from vedette.densities.factored import FactoredGLMB
 from vedette.densities.glmb import GLMB
@@ -49,7 +47,7 @@ _NODES = spread_nodes()[:, 1:]
 
 
 @dataclass(frozen=True, slots=True, repr=False)
-class Estimate(TabularRepr):
+class Estimate(Inspected):
     """Estimated targets at one time, in increasing label order.
 
     Attributes:
@@ -89,28 +87,14 @@ class Estimate(TabularRepr):
         """Iterate over label, existence probability, mean and covariance of each target, in increasing label order."""
         return self._targets().each()
 
-    def to_table(self) -> dict[str, list[Any]]:
-        """Return a table by columns, with one row per target. The columns are those of the table of a density."""
-        return self._targets().columns("existence")
-
-    def plot(self, ax: Any) -> None:
-        """Draw positions (m) into axes of Matplotlib, with labels and ellipses of two standard deviations.
-
-        Improbable targets are faint. Raises `InputError` for one-dimensional states.
-        """
-        self._targets().draw(ax)
-
     def _targets(self) -> Targets:
         return Targets(self.labels, self.existence, self.means, self.covs)
 
     def _summary(self) -> str:
         return f"of {pluralise(self.num_targets, 'target')}"
 
-    def _detail(self) -> str:
-        return self._targets().in_words()
-
     @classmethod
-    def empty(cls, state_dim: int) -> Estimate:
+    def empty(cls, state_dim: int) -> "Estimate":
         """Return an estimate without targets."""
         return cls(np.empty((0, 2), np.int64), *no_gaussians(state_dim), np.empty(0))
 
@@ -145,7 +129,6 @@ class Estimator(Protocol):
 
     def __call__(self, density: Any, step: int) -> Estimate:
         """Return the estimate at scan `step`, counted from 1, which labels targets of an unlabelled density."""
-        ...
 
 
 def map_estimate(density: LabelledDensity) -> Estimate:

@@ -1,7 +1,5 @@
 """Factored labelled density: a product of independent GLMBs over disjoint labels."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, ClassVar, Literal
@@ -124,18 +122,18 @@ class FactoredGLMB(Hypotheses):
         return self.to_kernel()
 
     @classmethod
-    def from_kernel(cls, density: kt.FactoredGlmb, undetected: UndetectedTargets | None = None) -> FactoredGLMB:
+    def from_kernel(cls, density: kt.FactoredGlmb, undetected: UndetectedTargets | None = None) -> "FactoredGLMB":
         """Return a density with the arrays of a kernel bundle, without copies and checks."""
         return unchecked(cls, TrackTable.from_kernel(density.tracks), *density[1:], undetected)
 
     @classmethod
-    def empty(cls, like: Any) -> FactoredGLMB:
+    def empty(cls, like: Any) -> "FactoredGLMB":
         """Return the density that is certain of no target, without factors. like: as in `TrackTable.empty`."""
         zero, none = np.zeros(1, np.int64), np.empty(0, np.int64)
         return unchecked(cls, TrackTable.empty(like), zero, zero.copy(), none, np.empty(0), np.zeros(1, np.int64), None)
 
     @classmethod
-    def from_factors(cls, factors: Sequence[GLMB], state_dim: int) -> FactoredGLMB:
+    def from_factors(cls, factors: Sequence[GLMB], state_dim: int) -> "FactoredGLMB":
         """Return the product of GLMBs, no two of which may share a label.
 
         Raises `InputError` for a label in two factors, or a factor of another state dimension.
@@ -147,12 +145,12 @@ class FactoredGLMB(Hypotheses):
         return cls.product([cls.of(factor) for factor in factors], state_dim)
 
     @classmethod
-    def of(cls, density: LabelledDensity) -> FactoredGLMB:
+    def of(cls, density: LabelledDensity) -> "FactoredGLMB":
         """Return the same density: a GLMB as one factor, an LMB as one per label (hypotheses: absent, then present)."""
         return density if isinstance(density, cls) else unchecked(cls, density.tracks, *density.to_factors()[1:], None)
 
     @classmethod
-    def product(cls, parts: Sequence[FactoredGLMB], state_dim: int) -> FactoredGLMB:
+    def product(cls, parts: "Sequence[FactoredGLMB]", state_dim: int) -> "FactoredGLMB":
         """Return the product of densities, no two of which may share a label: their factors, concatenated.
 
         state_dim: of all densities. Raises `InputError` for a label in two of them.

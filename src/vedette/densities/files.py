@@ -1,7 +1,5 @@
 """Density files in NumPy's .npz format, with every array stored exactly."""
 
-from __future__ import annotations
-
 import os
 from collections.abc import Mapping
 from dataclasses import fields

@@ -1,7 +1,5 @@
 """Densities of listed hypotheses, and the generalised labelled multi-Bernoulli, which is a single list."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, ClassVar, Literal, Self
@@ -114,17 +112,17 @@ class GLMB(Hypotheses):
         return kt.FactoredGlmb(own.tracks, tracks_end, *own[1:], hyps_end)
 
     @classmethod
-    def from_kernel(cls, glmb: kt.Glmb, sources: Ints | None = None) -> GLMB:
+    def from_kernel(cls, glmb: kt.Glmb, sources: Ints | None = None) -> "GLMB":
         """Return a density with the arrays of a kernel bundle and its track sources, without copies and checks."""
         return unchecked(cls, TrackTable.from_kernel(glmb.tracks, sources), *glmb[1:])
 
     @classmethod
-    def empty(cls, like: Any) -> GLMB:
+    def empty(cls, like: Any) -> "GLMB":
         """Return the density that is certain of no target. like: as in `TrackTable.empty`."""
         return unchecked(cls, TrackTable.empty(like), np.zeros(2, np.int64), np.empty(0, np.int64), np.zeros(1))
 
     @classmethod
-    def from_hypotheses(cls, tracks: TrackTable, hypotheses: Sequence[Sequence[int]], weights: Any) -> GLMB:
+    def from_hypotheses(cls, tracks: TrackTable, hypotheses: Sequence[Sequence[int]], weights: Any) -> "GLMB":
         """Return the density of hypotheses, each a sequence of indices into `tracks`, and their linear weights.
 
         The indices may be in any order. Raises `InputError` for an index outside the table, a label twice in one

@@ -1,7 +1,5 @@
 """Inspection of densities and estimates: their targets one by one, in words, and as columns."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from typing import Any, NamedTuple
 
@@ -91,7 +89,7 @@ class Targets(NamedTuple):
         axes.set_aspect("equal", adjustable="datalim")
         axes.set(xlabel="x (m)", ylabel="y (m)")
 
-    def _at(self, places: Ints) -> Targets:
+    def _at(self, places: Ints) -> "Targets":
         labels = None if self.labels is None else self.labels[places]
         return Targets(labels, self.weights[places], self.means[places], self.covs[places])
 

@@ -1,7 +1,5 @@
 """Label sets of a GLMB, and parts of densities: subsets of their hypotheses, labels or factors."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from itertools import pairwise

@@ -1,7 +1,5 @@
 """Base of the labelled densities, and the simplest of them, the labelled multi-Bernoulli."""
 
-from __future__ import annotations
-
 from abc import abstractmethod
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -240,26 +238,26 @@ class LMB(LabelledDensity):
         ends = np.repeat(each, 2)[:-1]
         return kt.FactoredGlmb(self.tracks.to_kernel(), each, ends, np.arange(num), log_weights.ravel(), 2 * each)
 
-    def with_labels(self, labels: Ints) -> LMB:
+    def with_labels(self, labels: Ints) -> "LMB":
         """Return the density with other labels, sorted in increasing order."""
         return self.with_fields(tracks=self.tracks.with_fields(labels=labels)).take(np.lexsort(labels.T[::-1]))
 
-    def take(self, places: Ints) -> LMB:
+    def take(self, places: Ints) -> "LMB":
         """Return the labels at `places`, in that order."""
         return unchecked(LMB, take_tracks(self.tracks, places), self.existence_logit[places])
 
     @classmethod
-    def from_kernel(cls, lmb: kt.Lmb) -> LMB:
+    def from_kernel(cls, lmb: kt.Lmb) -> "LMB":
         """Return a density with the arrays of a kernel bundle, without copies and checks."""
         return unchecked(cls, TrackTable.from_kernel(lmb.tracks), lmb.existence_logit)
 
     @classmethod
-    def empty(cls, like: Any) -> LMB:
+    def empty(cls, like: Any) -> "LMB":
         """Return the density that is certain of no target. like: as in `TrackTable.empty`."""
         return unchecked(cls, TrackTable.empty(like), np.empty(0))
 
     @classmethod
-    def from_bernoullis(cls, labels: Any, existence: Any, means: Any, covs: Any) -> LMB:
+    def from_bernoullis(cls, labels: Any, existence: Any, means: Any, covs: Any) -> "LMB":
         """Return a density of one Gaussian per label. The labels may be in any order and are sorted.
 
         labels: (num_tracks, 2) integers. existence: (num_tracks,) in [0, 1]. means: (num_tracks, state_dim).

@@ -1,7 +1,5 @@
 """Unlabelled multi-Bernoulli density with Gaussian-mixture components."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from typing import Any, ClassVar
@@ -81,17 +79,17 @@ class MultiBernoulli(Unlabelled):
         return kt.Lmb(tracks, for_kernel(self.existence_logit))
 
     @classmethod
-    def from_kernel(cls, lmb: kt.Lmb) -> MultiBernoulli:
+    def from_kernel(cls, lmb: kt.Lmb) -> "MultiBernoulli":
         """Return the Bernoullis of a kernel bundle, ignoring labels, without copies and checks."""
         return unchecked(cls, lmb.existence_logit, lmb.tracks.offsets, *lmb.tracks.components)
 
     @classmethod
-    def empty(cls, like: Any) -> MultiBernoulli:
+    def empty(cls, like: Any) -> "MultiBernoulli":
         """Return the density that is certain of no target. like: as in `TrackTable.empty`."""
         return cls(np.empty(0), np.zeros(1, np.int64), *no_components(like))
 
     @classmethod
-    def from_gaussians(cls, existence: Any, means: Any, covs: Any) -> MultiBernoulli:
+    def from_gaussians(cls, existence: Any, means: Any, covs: Any) -> "MultiBernoulli":
         """Return a density of one Gaussian per Bernoulli.
 
         existence: (num_bernoullis,) in [0, 1]. means: (num_bernoullis, state_dim). covs: (num_bernoullis, state_dim,

@@ -1,7 +1,5 @@
 """Products of powers of labelled densities, prepared so that their power integrals with another are sums of rows."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -30,7 +28,7 @@ class SensorPower(NamedTuple):
     floors: Floats  # (num_cases, n) log weights of substitutes for the 1st, ..., n-th, 1st, ... set that a case lacks
 
     @classmethod
-    def whole(cls, cases: DensityBatch, held: Bools) -> SensorPower:
+    def whole(cls, cases: DensityBatch, held: Bools) -> "SensorPower":
         """Return the factor of a single sensor, with nothing missing."""
         return cls(cases, 1.0, held, np.zeros((cases.num_cases, 1)))
 

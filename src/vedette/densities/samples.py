@@ -1,7 +1,5 @@
 """Random multi-target states drawn from a density."""
 
-from __future__ import annotations
-
 import numbers
 from dataclasses import dataclass
 from typing import Any

@@ -1,7 +1,5 @@
 """Summary statistics of a density: cardinality distribution and existence probabilities."""
 
-from __future__ import annotations
-
 from typing import Any
 
 from vedette.densities.containers import MultiTarget

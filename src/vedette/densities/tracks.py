@@ -1,7 +1,5 @@
 """The track table of labelled densities: labels and Gaussian mixtures, flat with offsets, and parts and moments."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -77,12 +75,12 @@ class TrackTable(Components):
         return kt.Tracks(labels, offsets, kt.Mixture(log_weights, means, covs, marks))
 
     @classmethod
-    def from_kernel(cls, tracks: kt.Tracks, sources: Ints | None = None) -> TrackTable:
+    def from_kernel(cls, tracks: kt.Tracks, sources: Ints | None = None) -> "TrackTable":
         """Return a table with the arrays of a kernel bundle, without copies and checks."""
         return unchecked(cls, tracks.labels, tracks.offsets, *tracks.components, sources)
 
     @classmethod
-    def empty(cls, like: Any) -> TrackTable:
+    def empty(cls, like: Any) -> "TrackTable":
         """Return a table without tracks. Raises `InputError` for an invalid state dimension.
 
         like: a state dimension, or a track table, density without labels or birth model of the same states and marks.
@@ -90,7 +88,7 @@ class TrackTable(Components):
         return cls.from_kernel(kt.Tracks(np.empty((0, 2), np.int64), np.zeros(1, np.int64), no_components(like)))
 
     @classmethod
-    def from_gaussians(cls, labels: Any, means: Any, covs: Any) -> TrackTable:
+    def from_gaussians(cls, labels: Any, means: Any, covs: Any) -> "TrackTable":
         """Return tracks of one Gaussian each.
 
         labels: (num_tracks, 2) integers. means: (num_tracks, state_dim). covs: (num_tracks, state_dim, state_dim).
@@ -101,7 +99,7 @@ class TrackTable(Components):
         return cls(checked, np.arange(num + 1), np.zeros(num), *checks.as_gaussians(means, covs, num))
 
     @classmethod
-    def from_mixtures(cls, labels: Any, mixtures: Sequence[tuple[Any, Any, Any]]) -> TrackTable:
+    def from_mixtures(cls, labels: Any, mixtures: Sequence[tuple[Any, Any, Any]]) -> "TrackTable":
         """Return tracks of one Gaussian mixture each, as (weights, means, covs) with linear weights that sum to one.
 
         Raises `InputError` for another shape, for weights that are negative or do not sum to one, or for a covariance

@@ -1,7 +1,5 @@
 """Poisson densities of targets that were never detected: next to the labels of a belief, and on a grid."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Any
 
@@ -34,8 +32,8 @@ class UndetectedTargets(SummaryRepr):
 
     intensity: Poisson
     next_label: tuple[int, int]
-    cells: UndetectedIntensity | None = None
-    birth_rate: LearntRate | None = None
+    cells: "UndetectedIntensity | None" = None
+    birth_rate: "LearntRate | None" = None
 
     def __post_init__(self) -> None:
         check_fields(self, "UndetectedTargets.")
@@ -61,7 +59,7 @@ class UndetectedTargets(SummaryRepr):
         return poisson_numbers(self.expected_number)
 
     @classmethod
-    def none(cls, like: Any) -> UndetectedTargets:
+    def none(cls, like: Any) -> "UndetectedTargets":
         """Return the density without targets, before the first scan. like: as in `TrackTable.empty`."""
         return cls(Poisson.empty(like), (0, 0))
 
@@ -137,7 +135,7 @@ class UndetectedIntensity(SummaryRepr):
         return f"of {self.num_cells} cells, {self.total:.4g} targets expected"
 
     @classmethod
-    def uniform(cls, grid: CellGrid, total: float) -> UndetectedIntensity:
+    def uniform(cls, grid: CellGrid, total: float) -> "UndetectedIntensity":
         """Return a uniform density of `total` targets. Raises `InputError` for a negative or infinite number."""
         return cls(grid, np.full(grid.num_cells, non_negative("total", total) / grid.num_cells))
 

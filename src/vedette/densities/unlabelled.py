@@ -1,7 +1,5 @@
 """Unlabelled densities of identically distributed targets: Poisson, independent identically distributed cluster."""
 
-from __future__ import annotations
-
 import math
 from abc import abstractmethod
 from dataclasses import dataclass, field
@@ -80,17 +78,17 @@ class Poisson(Unlabelled):
         return self._components()
 
     @classmethod
-    def from_kernel(cls, mixture: kt.Mixture) -> Poisson:
+    def from_kernel(cls, mixture: kt.Mixture) -> "Poisson":
         """Return a density with the arrays of a kernel bundle, without copies and checks."""
         return unchecked(cls, *mixture)
 
     @classmethod
-    def empty(cls, like: Any) -> Poisson:
+    def empty(cls, like: Any) -> "Poisson":
         """Return the density that is certain of no target. like: as in `TrackTable.empty`."""
         return cls(*no_components(like))
 
     @classmethod
-    def from_gaussians(cls, expected_numbers: Any, means: Any, covs: Any) -> Poisson:
+    def from_gaussians(cls, expected_numbers: Any, means: Any, covs: Any) -> "Poisson":
         """Return the density with the expected number, mean and covariance of each component.
 
         expected_numbers: (num_components,) linear. means: (num_components, state_dim).
@@ -162,17 +160,17 @@ class IidCluster(Unlabelled):
         return for_kernel(self.log_cardinality), self._components()
 
     @classmethod
-    def from_kernel(cls, log_cardinality: Floats, mixture: kt.Mixture) -> IidCluster:
+    def from_kernel(cls, log_cardinality: Floats, mixture: kt.Mixture) -> "IidCluster":
         """Return a density with the arrays of a kernel bundle, without copies and checks."""
         return unchecked(cls, log_cardinality, *mixture)
 
     @classmethod
-    def empty(cls, like: Any) -> IidCluster:
+    def empty(cls, like: Any) -> "IidCluster":
         """Return the density that is certain of no target. like: as in `TrackTable.empty`."""
         return cls(np.zeros(1), *no_components(like))
 
     @classmethod
-    def from_gaussians(cls, cardinality: Any, weights: Any, means: Any, covs: Any) -> IidCluster:
+    def from_gaussians(cls, cardinality: Any, weights: Any, means: Any, covs: Any) -> "IidCluster":
         """Return the density with linear probabilities of 0, 1, ... targets and the Gaussian mixture of one target.
 
         cardinality: (most + 1,). weights: (num_components,), summing to one. means: (num_components, state_dim).

@@ -1,7 +1,5 @@
 """Cauchy-Schwarz divergence of multi-target densities, in closed form."""
 
-from __future__ import annotations
-
 import math
 from typing import Literal, TypeAlias
 

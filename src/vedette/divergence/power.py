@@ -1,7 +1,5 @@
 """Power integrals of two labelled densities, the Renyi divergence made of them, and a unit of hyper-volume for both."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 

@@ -5,34 +5,15 @@ Figures are in `vedette.evaluation.figures`.
 
 from vedette.evaluation.comparison import Comparison, compare, decided_actions
 from vedette.evaluation.ensembles import Ensemble
-from vedette.evaluation.metrics import (
-    AverageNees,
-    Continuity,
-    GospaResult,
-    GospaSeries,
-    Matching,
-    Metric,
-    OspaResult,
-    RunMetrics,
-    TimeToTrack,
-    TrackedFraction,
-    TrackSet,
-    average_nees,
-    continuity,
-    continuity_of_run,
-    gospa,
-    gospa_distance,
-    gospa_of_run,
-    match_run,
-    measure,
-    nees,
-    nees_interval,
-    ospa,
-    ospa2,
-    ospa2_of_run,
-    ospa_of_run,
-    targets_in_view,
-)
+from vedette.evaluation.metrics.consistency import AverageNees, average_nees, nees, nees_interval
+from vedette.evaluation.metrics.matching import Matching, match_run
+from vedette.evaluation.metrics.point_gospa import GospaResult, GospaSeries, gospa, gospa_distance, gospa_of_run
+from vedette.evaluation.metrics.point_ospa import OspaResult, ospa, ospa_of_run
+from vedette.evaluation.metrics.run import Metric, RunMetrics, measure
+from vedette.evaluation.metrics.time_to_track import TimeToTrack
+from vedette.evaluation.metrics.track_ospa import TrackSet, ospa2, ospa2_of_run
+from vedette.evaluation.metrics.tracked_fraction import TrackedFraction, targets_in_view
+from vedette.evaluation.metrics.trajectories import Continuity, continuity, continuity_of_run
 from vedette.evaluation.rewards import MeanRewards, mean_rewards
 from vedette.evaluation.runs import custom_metrics, measure_run, run_scenario, track_recording
 from vedette.evaluation.statistics import PairedDifference, Summary, holm, paired_difference, summarise

@@ -1,7 +1,5 @@
 """Actions in words, and as an axis of a figure."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from typing import NamedTuple, TypeAlias
 
@@ -40,7 +38,7 @@ class ActionAxis(NamedTuple):
         suffix = f" of {sensor}" if sensor else ""
         return self.name[:1].upper() + self.name[1:] + suffix + (f" ({self.unit})" if self.unit else "")
 
-    def counted(self) -> ActionAxis:
+    def counted(self) -> "ActionAxis":
         """Return the axis with the actions side by side, regardless of their numbers."""
         return self._replace(places=np.arange(1.0, len(self.places) + 1), is_numeric=False)
 

@@ -1,7 +1,5 @@
 """Means over successive values, whose errors are correlated: by blocks of them."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from typing import NamedTuple
@@ -34,7 +32,7 @@ class BlockMean(NamedTuple):
         scale = (8.0 * self.freedom + 1.0) / (8.0 * self.freedom + 3.0)
         return scale * math.sqrt(self.freedom * math.log1p(ratio**2 / self.freedom))
 
-    def minus(self, other: BlockMean) -> BlockMean:
+    def minus(self, other: "BlockMean") -> "BlockMean":
         """Return the difference to the mean of other blocks, which vary alike. It counts with the fewer blocks."""
         both, freedom = (self, other), self.freedom + other.freedom
         variance = sum(each.freedom * max(each.num, 1) * each.error**2 for each in both) / freedom

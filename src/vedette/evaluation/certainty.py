@@ -1,7 +1,5 @@
 """Certainty of a decision in words: its lead over the runner-up, and whether it is proven optimal."""
 
-from __future__ import annotations
-
 import math
 
 from vedette.control.plan import Plan

@@ -1,7 +1,5 @@
 """Comparison of strategies, over runs that share their random numbers."""
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -10,7 +8,7 @@ import numpy as np
 
 from vedette.errors import InputError
 from vedette.evaluation.ensembles import PARTS, Choice, Ensemble, build_ensemble, rounded_choice
-from vedette.evaluation.metrics import RunMetrics
+from vedette.evaluation.metrics.run import RunMetrics
 from vedette.evaluation.statistics import PairedDifference, Summary, holm, paired_difference, summarise
 from vedette.internal.representation import SummaryRepr
 from vedette.internal.text import elided, pluralise

@@ -1,7 +1,5 @@
 """Diagnostics of one or more runs: what filters and fusion truncated, dropped or lost, and whether it matters."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator, Sequence
 from typing import Literal, NamedTuple

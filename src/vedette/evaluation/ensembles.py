@@ -1,7 +1,5 @@
 """The runs of one strategy as arrays over runs and scans, for comparisons and reports."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, TypeAlias
@@ -13,7 +11,7 @@ from vedette.control import Plan
 from vedette.errors import InputError
 from vedette.evaluation.actions import Row, rounded
 from vedette.evaluation.health import HealthSums, add_health_sums, health_sums
-from vedette.evaluation.metrics import RunMetrics
+from vedette.evaluation.metrics.run import RunMetrics
 from vedette.evaluation.rewards import RewardSums
 from vedette.internal.representation import SummaryRepr
 from vedette.internal.text import elided, pluralise

@@ -1,7 +1,5 @@
 """Tests of a sensor's detections and false measurements by range and by sector."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Likelihood ratios of gaps: whether a new label is the target of one that ended, or a newborn target."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
@@ -54,7 +52,7 @@ class _EndedLabels:
     detected: Floats  # (num,) probability that a scan since would have detected it
 
     @classmethod
-    def none(cls, dim: int) -> _EndedLabels:
+    def none(cls, dim: int) -> "_EndedLabels":
         empty = components_of(np.empty(0), np.empty((0, dim)), np.empty((0, dim, dim)))
         return cls(np.empty(0, np.int64), np.empty(0), empty, np.empty(0), np.empty(0))
 

@@ -1,7 +1,5 @@
 """Reports of filters and fusion, summed over one or more runs."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import NamedTuple
 

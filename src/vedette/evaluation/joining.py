@@ -1,7 +1,5 @@
 """Joined tracks: an ended label and a new one become one track if the likelihood of the gap supports it."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import NamedTuple

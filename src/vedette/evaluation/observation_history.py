@@ -1,7 +1,5 @@
 """Observation of targets: models, times and poses, and the births that may begin the labels of a record."""
 
-from __future__ import annotations
-
 from bisect import bisect_left
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace

@@ -1,7 +1,5 @@
 """Compilation before the first run, by two processes in parallel, each with a small example."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import replace
 from multiprocessing import get_context

@@ -1,7 +1,5 @@
 """Clock of a run and names of its targets, from the recordings of its scenario."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

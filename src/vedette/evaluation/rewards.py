@@ -1,7 +1,5 @@
 """Rewards of the actions at each decision, averaged over runs."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
@@ -58,7 +56,7 @@ class RewardSums(NamedTuple):
     num_runs: int
 
     @classmethod
-    def from_decisions(cls, decision: int, decisions: Sequence[Decision]) -> RewardSums:
+    def from_decisions(cls, decision: int, decisions: Sequence[Decision]) -> "RewardSums":
         """Return the sums of runs that made the decision of that index."""
         first, tables = decisions[0], [decision.plan.tables for decision in decisions]
         shapes = [tuple(table.mean.shape for table in run_tables) for run_tables in tables]
@@ -78,14 +76,14 @@ class RewardSums(NamedTuple):
         return cls(first, tuple(faults), counts, means, squares, chosen, is_absolute, is_relative, len(decisions))
 
     @staticmethod
-    def combine(parts: Sequence[RewardSums]) -> RewardSums:
+    def combine(parts: "Sequence[RewardSums]") -> "RewardSums":
         """Return the sums over all runs of several sums."""
         total = parts[0]
         for part in parts[1:]:
             total = total._add(part)
         return total
 
-    def _add(self, other: RewardSums) -> RewardSums:
+    def _add(self, other: "RewardSums") -> "RewardSums":
         """Add by T. Chan, G. Golub and R. LeVeque, "Updating formulae and a pairwise algorithm", 1979, eq. 2.1."""
         faults, num_runs = self.faults + other.faults, self.num_runs + other.num_runs
         if not faults and [each.shape for each in self.means] != [each.shape for each in other.means]:

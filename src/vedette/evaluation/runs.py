@@ -1,12 +1,11 @@
 """One run of a scenario under a strategy."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from functools import partial
 from pathlib import Path
 
-from vedette.evaluation.metrics import Metric, RunMetrics, measure, ospa_of_run
+from vedette.evaluation.metrics.point_ospa import ospa_of_run
+from vedette.evaluation.metrics.run import Metric, RunMetrics, measure
 from vedette.kernels.base.types import HEIGHT, place_of
 from vedette.recorded import RecordedScans
 from vedette.scenarios import Scenario, load_scenario

@@ -1,7 +1,5 @@
 """Times of the scans of each sensor: gaps, a sensor that starts late or ends early, and two periods."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator, Sequence
 

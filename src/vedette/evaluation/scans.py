@@ -1,7 +1,5 @@
 """The scans of a recorded run, for display: drawn again from its seed, or read from its recording."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from functools import partial
 from math import isnan

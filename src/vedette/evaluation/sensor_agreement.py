@@ -1,7 +1,5 @@
 """Warnings of sensors that agree on no target, because of wrong units, north or places."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping, Sequence
 from itertools import combinations
 from typing import NamedTuple

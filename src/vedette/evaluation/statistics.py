@@ -1,7 +1,5 @@
 """Means over runs, and differences between strategies that were run on the same random numbers."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 from functools import lru_cache
 

@@ -1,7 +1,5 @@
 """Tables that compare strategies, as text, Markdown, LaTeX and CSV."""
 
-from __future__ import annotations
-
 import csv
 import io
 import itertools

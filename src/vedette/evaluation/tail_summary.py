@@ -1,7 +1,5 @@
 """Tails of runs: the median and the worst run, and the share of runs that end with a lost target."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import NamedTuple
 

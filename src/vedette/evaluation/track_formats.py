@@ -1,7 +1,5 @@
 """Whole tracks in formats of maps, globes and log viewers: GeoJSON, CZML, MCAP."""
 
-from __future__ import annotations
-
 import io
 import json
 from collections import defaultdict

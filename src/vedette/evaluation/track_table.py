@@ -1,7 +1,5 @@
 """Estimated tracks for other programs: named columns, longitude and latitude, UTC, in files of five formats."""
 
-from __future__ import annotations
-
 import csv
 import io
 from collections.abc import Mapping, Sequence

@@ -1,7 +1,5 @@
 """Unexplained measurements on straight courses: targets faster than assumed."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from itertools import pairwise

@@ -1,7 +1,5 @@
 """Data association methods of the filters."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 from typing import Annotated, Any, ClassVar, Protocol, TypeAlias, runtime_checkable
 
@@ -23,7 +21,6 @@ class MarginalAssociation(Protocol):
 
     def to_kernel(self) -> Association | None:
         """Return the kernel form of the method, or None for the sums over clusters."""
-        ...
 
 
 @part("ranked", "assignment")

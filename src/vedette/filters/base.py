@@ -1,7 +1,5 @@
 """Shared parts of the single-sensor filters: models, checks and kernel inputs."""
 
-from __future__ import annotations
-
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -268,5 +266,5 @@ class LabelledFilter(SingleSensorFilter, LabelledFilterBase[BeliefT]):
         """Return the posterior and report in kernel form."""
 
     @abstractmethod
-    def _blind(self) -> LabelledFilter[BeliefT]:
+    def _blind(self) -> "LabelledFilter[BeliefT]":
         """Return the filter whose step is the prediction: its sensor detects nothing."""

@@ -1,7 +1,5 @@
 """The factored GLMB filter: labels that interact are tracked jointly, all others independently."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -209,7 +207,7 @@ class FactoredGlmbFilter(_FactoredFilterBase, LabelledFilter[FactoredGLMB]):
     scans_together: Count = 1
     births: Literal["poisson", "labelled"] = "poisson"
 
-    def _blind(self) -> FactoredGlmbFilter:
+    def _blind(self) -> "FactoredGlmbFilter":
         return replace(self, sensor=blind_sensor(), limits=self.limits.keeping_labels())
 
     def _run_kernel(self, prior: _Before, step: SensorStep) -> tuple[_Before, FactoredReport]:

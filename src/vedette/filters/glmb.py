@@ -1,7 +1,5 @@
 """The delta-GLMB ("Vo-Vo") filter, of one sensor and of several sensors with sequential updates."""
 
-from __future__ import annotations
-
 import math
 import warnings
 from collections.abc import Sequence
@@ -118,7 +116,7 @@ class DeltaGlmbFilter(_GlmbFilterBase, LabelledFilter[GLMB]):
         if not isinstance(self.assignment, JointAssociation):
             raise InputError(f"assignment: expected RankedAssignment or Gibbs; got {type(self.assignment).__name__}")
 
-    def _blind(self) -> DeltaGlmbFilter:
+    def _blind(self) -> "DeltaGlmbFilter":
         return replace(self, sensor=blind_sensor(), assignment=RankedAssignment())
 
     def _run_kernel(self, prior: Glmb, step: SensorStep) -> tuple[Glmb, StepReport]:

@@ -1,7 +1,5 @@
 """Checks of the input of a filter step, and translation of kernel errors."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator
 from contextlib import contextmanager

@@ -1,7 +1,5 @@
 """Caps and thresholds of the filters. Each is a named field of `Limits`."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass, replace
 from functools import lru_cache
@@ -94,7 +92,7 @@ class Limits:
         check_fields(self, "Limits.")
 
     @classmethod
-    def none(cls) -> Limits:
+    def none(cls) -> "Limits":
         """Return limits that drop, gate and merge nothing."""
         return cls(
             max_hypotheses=2**62,
@@ -139,7 +137,7 @@ class Limits:
             return belief, 0.0
         return without_labels(belief, _spread_labels(belief, self.max_position_std))
 
-    def keeping_labels(self) -> Limits:
+    def keeping_labels(self) -> "Limits":
         """Return the same limits, but with no label dropped."""
         return _keeping_labels(self)
 

@@ -1,7 +1,5 @@
 """The labelled multi-Bernoulli filter, of one sensor and of several sensors with sequential updates."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -74,7 +72,7 @@ class LmbFilter(LmbFilterBase, LabelledFilter[LMB]):
 
     assignment: LmbAssociation = field(default_factory=RankedAssignment)
 
-    def _blind(self) -> LmbFilter:
+    def _blind(self) -> "LmbFilter":
         return LmbFilter(self.targets, blind_sensor(), Limits.none())
 
     def _run_kernel(self, prior: Lmb, step: SensorStep) -> tuple[Lmb, LmbReport]:

@@ -1,7 +1,5 @@
 """Shared parts of the central filters: one belief, updated with the scans of several sensors at one time."""
 
-from __future__ import annotations
-
 from abc import abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass, field

@@ -1,7 +1,5 @@
 """The central LMB filter: all combinations of the measurements of all sensors are weighted jointly."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 from vedette.densities import LMB

@@ -1,7 +1,5 @@
 """Protocols of filters, and the report of a step."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, Protocol, runtime_checkable
@@ -81,22 +79,18 @@ class Filter(Protocol):
     @property
     def targets(self) -> TargetModel:
         """Model of the targets, the same object for all sensors."""
-        ...
 
     @property
     def sensor(self) -> SensorModel:
         """Model of the sensor."""
-        ...
 
     def initial(self) -> Any:
         """Return the belief before the first scan."""
-        ...
 
     def step(
         self, belief: Any, scan: Any, pose: Any, dt: float, step: int, *, rng: np.random.Generator
     ) -> tuple[Any, FilterInfo]:
         """Predict over `dt` seconds and update with a scan. See `DeltaGlmbFilter.step`."""
-        ...
 
 
 @runtime_checkable
@@ -119,15 +113,12 @@ class PredictUpdateFilter(Filter, Protocol):
         births: LMB | None = None,
     ) -> tuple[Any, FilterInfo]:
         """Predict over `dt` seconds and update with a scan. See `DeltaGlmbFilter.step`."""
-        ...
 
     def predict(self, belief: Any, dt: float, step: int, *, births: LMB | None = None) -> tuple[Any, FilterInfo]:
         """Return the belief `dt` seconds later, with the births of that time. See `DeltaGlmbFilter.predict`."""
-        ...
 
     def update(self, belief: Any, scan: Any, pose: Any, *, rng: np.random.Generator) -> tuple[Any, FilterInfo]:
         """Return the posterior after a scan at the time of the belief. See `DeltaGlmbFilter.update`."""
-        ...
 
 
 def has_labels(tracker: Filter) -> bool:

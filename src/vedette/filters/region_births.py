@@ -1,7 +1,5 @@
 """Targets that appear anywhere in a region, on cells: prediction, scans, and the posterior of their birth rate."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from functools import lru_cache
 from typing import NamedTuple

@@ -1,7 +1,5 @@
 """Undetected targets between scans: births as a Poisson intensity, survival and motion."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from functools import lru_cache
 from typing import Any, NamedTuple

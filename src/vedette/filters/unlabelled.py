@@ -1,7 +1,5 @@
 """The filters without labels: PHD, CPHD and CB-MeMBer."""
 
-from __future__ import annotations
-
 import math
 from abc import ABC, abstractmethod
 from dataclasses import dataclass, replace

@@ -1,7 +1,5 @@
 """Alignment of marginalised GLMBs, or products of them: one factor for each group on the union of their label sets."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Protocols of fusion rules, the report of a fusion, and checks of its input."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -73,7 +71,6 @@ class Fusion(Protocol):
         views: fields of view of the sensors, and the density that they were updated from, or None if not known, as in
         the decisions of a planner.
         """
-        ...
 
 
 @runtime_checkable
@@ -83,7 +80,6 @@ class RequiresCommonPrior(Protocol):
     @property
     def requires_common_prior(self) -> bool:
         """True if all beliefs must be updated from one prediction."""
-        ...
 
 
 @runtime_checkable
@@ -93,7 +89,6 @@ class SupportsLabelMatching(Protocol):
     @property
     def matches_labels(self) -> bool:
         """True if labels may differ across sensors."""
-        ...
 
 
 def requires_common_prior(fusion: Any) -> bool:
@@ -121,7 +116,6 @@ class LogLinearFusion(Protocol):
 
     def log_linear_pool(self, num_sensors: int) -> LogLinearPool | None:
         """Return the pool for `num_sensors` sensors and single Gaussians, or None if the fusion is not log-linear."""
-        ...
 
 
 class PrevalidatedBeliefs(tuple[Any, ...]):

@@ -1,7 +1,5 @@
 """Class probabilities of fused targets, updated by the evidence of each sensor's scan."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from vedette.kernels.base.types import Floats

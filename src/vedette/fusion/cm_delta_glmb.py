@@ -1,7 +1,5 @@
 """Generalised covariance intersection of marginalised delta-GLMB densities."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field

@@ -1,7 +1,5 @@
 """Fusion of LMBs label by label: generalised covariance intersection, and the arithmetic average."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import NamedTuple
@@ -147,12 +145,12 @@ class _Powers(NamedTuple):
     participating: Bools  # (num_labels, num_sensors)
 
     @classmethod
-    def plain(cls, aligned: AlignedLmbs, weights: Floats) -> _Powers:
+    def plain(cls, aligned: AlignedLmbs, weights: Floats) -> "_Powers":
         """Return the same weights for every label."""
         return cls(weights, weights, aligned.chosen, np.ones(aligned.chosen.shape, np.bool_))
 
     @classmethod
-    def by_view(cls, aligned: AlignedLmbs, weights: Floats, views: FieldsOfView, active: Sequence[int]) -> _Powers:
+    def by_view(cls, aligned: AlignedLmbs, weights: Floats, views: FieldsOfView, active: Sequence[int]) -> "_Powers":
         """Return weights by how well each sensor observes each label."""
         shares = view_weights(aligned, weights, views, active)
         chosen = np.where(shares > 0.0, aligned.chosen, -1)

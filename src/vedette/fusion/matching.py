@@ -1,7 +1,5 @@
 """Matching of labels across sensors, before a fusion that works by labels."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, ClassVar, NamedTuple
@@ -37,7 +35,7 @@ class _Targets(NamedTuple):
     covs: Floats  # (num_labels, dim, dim)
 
     @classmethod
-    def of(cls, belief: LabelledDensity) -> _Targets:
+    def of(cls, belief: LabelledDensity) -> "_Targets":
         lmb = as_lmb(belief)
         labels = [tuple(label) for label in lmb.tracks.labels.tolist()]
         return cls(labels, lmb.existence, *track_moments(lmb.tracks))

@@ -1,7 +1,5 @@
 """Parallel update: fusion of posteriors that were updated from one common prediction, each by its sensor's own scan."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace

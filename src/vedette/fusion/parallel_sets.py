@@ -1,7 +1,5 @@
 """Parallel update of posteriors of one common prediction: single labels, and label sets of labels that interact."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from typing import NamedTuple
@@ -148,7 +146,7 @@ class _FactorEvidence(NamedTuple):
     tracks: Ints  # (num_sets, num_own) tracks of the factor; -1 for absent labels, and if it lacks the set
 
     @classmethod
-    def of(cls, factor: GLMB, labels: Ints, members: Bools, prior: Floats) -> _FactorEvidence:
+    def of(cls, factor: GLMB, labels: Ints, members: Bools, prior: Floats) -> "_FactorEvidence":
         own_labels = np.unique(factor.tracks.labels, axis=0)
         columns = places_of(own_labels, labels)
         parts, part_of = np.unique(members[:, columns], axis=0, return_inverse=True)

@@ -1,7 +1,5 @@
 """Powers of mixtures, the limits on the cost of a fusion, and the cubature rule of powers."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator
 from contextlib import contextmanager

@@ -1,7 +1,5 @@
 """Precomputed fusions for planners: power integrals of all joint actions without forming a fused density."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Protocol, runtime_checkable
 
@@ -27,7 +25,6 @@ class PrecomputedFusion(Protocol):
         scale cancels in a reward. actions: (num_joint, num_sensors) one action of each sensor. exponents: pairs (a, b).
         unit_volume: K.
         """
-        ...
 
 
 @runtime_checkable
@@ -40,7 +37,6 @@ class SupportsPrecomputation(Protocol):
         cases: one batch per sensor. prediction: the density to compare with, with one Gaussian per track. A GLMB must
         be marginalised. The result equals `fuse` of each combination, except for the scale.
         """
-        ...
 
 
 def precompute_single_sensor(own: DensityBatch, prediction: GLMB | LMB) -> PowerProducts | None:

@@ -1,7 +1,5 @@
 """Rebasing: apply the information of a sensor's scan to a prediction other than the one that it updated."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from vedette.densities import LMB, TrackTable

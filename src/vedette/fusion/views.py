@@ -1,7 +1,5 @@
 """Fields of view of the sensors at their scans, and the fusion weights that follow for each label of their LMBs."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -53,7 +51,7 @@ class FieldsOfView:
         if not isinstance(self.prediction, LabelledDensity | None):
             raise reject("views.prediction", f"{LABELLED}, or None", type(self.prediction).__name__)
 
-    def if_all_scanned(self) -> FieldsOfView:
+    def if_all_scanned(self) -> "FieldsOfView":
         """Return the fields of view as if each sensor had scanned."""
         return replace(self, scanned=(True,) * len(self.sensors))
 

@@ -1,7 +1,5 @@
 """Episodes: scenario runs that advance from one decision to the next (used by all environments)."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any, Literal, NamedTuple, TypeAlias
@@ -52,7 +50,7 @@ class BuiltScenario:
         self.score = score
 
     @property
-    def layout(self) -> Layout:
+    def layout(self) -> "Layout":
         """Layout of its observations and actions."""
         return Layout.of(self.encoder.decision_context(self.experiment.tracker.initial(), self.experiment.poses))
 
@@ -65,7 +63,7 @@ class Layout(NamedTuple):
     deciding: tuple[int, ...]  # indices of these sensors
 
     @classmethod
-    def of(cls, context: DecisionContext) -> Layout:
+    def of(cls, context: DecisionContext) -> "Layout":
         """Return the layout of a decision."""
         options, shown = context.options, context.observation
         deciding = deciding_sensors(options)

@@ -1,7 +1,5 @@
 """Observations of a policy before a decision: beliefs, sensors and their actions as arrays of fixed size."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, NamedTuple, TypeAlias
@@ -10,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from vedette.control import Constraint, MobileSensor, PlanningSettings
-from vedette.control.constraints import Mask, nearest_feasible
+from vedette.control.constraints.mask import Mask, nearest_feasible
 from vedette.control.inputs import mask_of_decision, options_of, single_mask
 from vedette.densities import LabelledDensity, best_estimate
 from vedette.errors import InputError
@@ -65,7 +63,7 @@ class ObservationEncoder(Checked):
         return len(getattr(self.sensors[0].filter.targets.motion, "names", ()))
 
     @classmethod
-    def of(cls, parts: Mapping[str, Any], num_labels: int = 10) -> ObservationEncoder:
+    def of(cls, parts: Mapping[str, Any], num_labels: int = 10) -> "ObservationEncoder":
         """Return the encoder for the parts of a scenario's planner (`vedette.scenarios.build.build_parts`)."""
         schedule = parts["oracle"]["schedule"]
         return cls(parts["sensors"], parts["settings"], parts["constraints"], schedule, num_labels)

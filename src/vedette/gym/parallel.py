@@ -1,7 +1,5 @@
 """An environment in which every sensor is an agent."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Any, ClassVar, Literal
 

@@ -1,7 +1,5 @@
 """Policies as planners: in a campaign, on the same seeds as any other."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, TypeAlias

@@ -1,7 +1,5 @@
 """An environment in which one agent controls all sensors."""
 
-from __future__ import annotations
-
 from typing import Any, ClassVar
 
 import gymnasium

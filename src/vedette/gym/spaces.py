@@ -1,7 +1,5 @@
 """The spaces of observations."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Any
 

@@ -1,7 +1,5 @@
 """A window that shows pictures."""
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import NDArray
 

@@ -1,7 +1,5 @@
 """Validity checks of covariance matrices. Separate from the models, so that checking a file does not import them."""
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import NDArray
 

@@ -5,8 +5,6 @@ labels is a hypothesis. `birth.period` keeps the expected number of births the s
 steps make more labels, and the cap on hypotheses cuts their larger sets.
 """
 
-from __future__ import annotations
-
 import math
 
 # Share of the expected births above which a scenario is refused, or a scenario or filter causes a warning.

@@ -4,8 +4,6 @@ Filters, fusion, decisions and scenarios need only `pip install vedette`. The ot
 pyproject.toml: `pip install 'vedette[report]'`.
 """
 
-from __future__ import annotations
-
 from importlib.util import find_spec
 
 from vedette.errors import MissingPackageError

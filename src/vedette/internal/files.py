@@ -1,7 +1,5 @@
 """Atomic file writes and lock files: a file appears complete or not at all."""
 
-from __future__ import annotations
-
 import contextlib
 import errno
 import os

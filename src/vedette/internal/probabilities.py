@@ -3,8 +3,6 @@
 SciPy has them too, but importing `scipy.special` takes as long as the first scan of a run.
 """
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Child processes that share modules loaded once by a server process, ignore Ctrl-C, and end with this process."""
 
-from __future__ import annotations
-
 import contextlib
 import multiprocessing
 import os

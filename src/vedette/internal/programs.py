@@ -1,7 +1,5 @@
 """External programs in any language that exchange lines of JSON over a pipe: docs/benchmark.md."""
 
-from __future__ import annotations
-
 import json
 import os
 import shlex

@@ -1,7 +1,5 @@
 """The quantities that sensors measure, and the kinds of measurements: one table for models, recordings and files."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 from typing import NamedTuple

@@ -3,8 +3,6 @@
 Every function raises `ValueError` for content that it refuses. The message fits after "it is damaged: ".
 """
 
-from __future__ import annotations
-
 import io
 import json
 import math

@@ -1,7 +1,5 @@
 """Text and notebook representations of containers: one or two lines, and in a notebook the first rows of the table."""
 
-from __future__ import annotations
-
 from abc import abstractmethod
 from html import escape
 from typing import Any

@@ -1,7 +1,5 @@
 """Text helpers: counts and units in words, elided names, tables in Markdown."""
 
-from __future__ import annotations
-
 import itertools
 import re
 from collections.abc import Collection, Iterable, Sequence

@@ -1,7 +1,5 @@
 """Distribution of independent items over threads, in pieces. Kernels run without the interpreter lock."""
 
-from __future__ import annotations
-
 import os
 import time
 from collections.abc import Callable

@@ -1,7 +1,5 @@
 """Warnings about values that are valid but probably in the wrong unit: angles or positions in degrees."""
 
-from __future__ import annotations
-
 import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager

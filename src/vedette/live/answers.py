@@ -1,7 +1,5 @@
 """Answers of the live loop: lines of JSON about tracks and plans."""
 
-from __future__ import annotations
-
 import json
 import math
 from collections.abc import Sequence

@@ -1,7 +1,5 @@
 """The live loop of a scenario."""
 
-from __future__ import annotations
-
 from contextlib import suppress
 from typing import Any
 

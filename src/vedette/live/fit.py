@@ -1,7 +1,5 @@
 """Fit of the assumed model to the latest scans of a stream."""
 
-from __future__ import annotations
-
 import math
 import re
 from bisect import bisect_right
@@ -44,7 +42,7 @@ class LiveFit:
         """Present findings."""
         return Fit(tuple(finding for finding, _ in self.found), self.searched)
 
-    def continued(self, before: Timeline, after: Timeline, estimate: Estimator, assumed: Assumed) -> LiveFit:
+    def continued(self, before: Timeline, after: Timeline, estimate: Estimator, assumed: Assumed) -> "LiveFit":
         """Return the window with the instants between two timelines, tested if enough scans arrived."""
         last = -math.inf if self.before is None else self.before.time
         entries = [each for each in before.entries if last < each.time < after.entries[0].time]

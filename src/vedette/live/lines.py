@@ -1,7 +1,5 @@
 """Splitting of bytes from any source into lines, in bounded memory."""
 
-from __future__ import annotations
-
 import asyncio
 import contextlib
 import os

@@ -1,7 +1,5 @@
 """The live loop: a function from (state, line) to (state, answers), without other input or output."""
 
-from __future__ import annotations
-
 import math
 from bisect import bisect_right
 from dataclasses import dataclass, field, replace

@@ -1,7 +1,5 @@
 """Strict reader of scans as lines of JSON: an invalid line is an error, and no part of it is used."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """Files of a live loop: a record of its lines and snapshots of its state, to resume after any interruption."""
 
-from __future__ import annotations
-
 import contextlib
 import os
 import time

@@ -1,7 +1,5 @@
 """Remarks about clients, limited in number so that no client can fill the screen or a log with them."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Callable
 from typing import Protocol

@@ -1,7 +1,5 @@
 """Exchange of lines with many clients, protected against overload and clients without a token, and a TCP server."""
 
-from __future__ import annotations
-
 import asyncio
 import contextlib
 import hmac
@@ -62,19 +60,15 @@ class Client(Protocol):
 
     def send(self, text: bytes) -> None:
         """Send without waiting. Unread bytes stay in a buffer."""
-        ...
 
     def unread(self) -> int:
         """Return the bytes in that buffer."""
-        ...
 
     def is_gone(self) -> bool:
         """Return True once the connection has ended or is ending."""
-        ...
 
     def abort(self) -> None:
         """End the connection."""
-        ...
 
 
 def peer_name(transport: asyncio.BaseTransport) -> tuple[str, str]:

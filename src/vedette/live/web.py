@@ -5,8 +5,6 @@ page, which gets its frames from `/page`. Browsers let any web page open sockets
 another page, or under another name of this machine, are refused.
 """
 
-from __future__ import annotations
-
 import asyncio
 import logging
 from http import HTTPStatus
@@ -43,7 +41,6 @@ class Screen(Protocol):
 
     def frame(self) -> bytes:
         """Return the current frame as JSON."""
-        ...
 
 
 class _WebClient:

@@ -1,7 +1,5 @@
 """Checks of arguments. Each raises `InputError` with the field, the expected and the given value."""
 
-from __future__ import annotations
-
 import inspect
 import math
 import numbers

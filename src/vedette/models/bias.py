@@ -1,7 +1,5 @@
 """Constant bias of a sensor's measurements, clock and position."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, fields
 
@@ -9,25 +7,26 @@ import numpy as np
 
 from vedette.internal.quantities import QUANTITIES
 from vedette.kernels.base.types import Floats
-from vedette.models.fields import Real, check_fields
+from vedette.models.fields import Real, check_fields, part
 from vedette.models.measurement import wrap_angles
 
 LEAST_RANGE = 1.0  # m; smallest range after a bias is subtracted or added
 
 
+@part(bearing_deg="bearing", elevation_deg="elevation")
 @dataclass(frozen=True, slots=True)
 class Bias:
     """Constant bias of the scans of a sensor: the reported minus the true value of each quantity.
 
     Attributes:
-        range: bias of ranges in m.
-        bearing: bias of bearings in rad, positive in the direction of the scans' angles: clockwise in a recording with
-            bearings from the north, else counter-clockwise.
-        clock: time in s by which the sensor's clock is ahead.
-        x, y: bias in m of the reported position of the sensor, or of the positions that it measures.
-        range_rate: bias of range rates in m/s.
-        elevation: bias of elevations in rad.
-        altitude: bias of altitudes in m.
+        range: bias of ranges [m].
+        bearing: bias of bearings, positive in the direction of the scans' angles: clockwise of a sensor with a compass
+            and where recorded or live scans have bearings from the north, else counter-clockwise [rad].
+        clock: time by which the sensor's clock is ahead [s].
+        x, y: bias of the reported position of the sensor, or of the positions that it measures, east and north [m].
+        range_rate: bias of range rates [m/s].
+        elevation: bias of elevations [rad].
+        altitude: bias of altitudes [m].
 
     Raises:
         InputError: a number that is not finite.
@@ -45,7 +44,7 @@ class Bias:
     def __post_init__(self) -> None:
         check_fields(self, "Bias.")
 
-    def __sub__(self, other: Bias) -> Bias:
+    def __sub__(self, other: "Bias") -> "Bias":
         """Return the difference of two biases, component by component."""
         return Bias(*(getattr(self, each.name) - getattr(other, each.name) for each in fields(self)))
 

@@ -1,7 +1,5 @@
 """Labelled multi-Bernoulli birth: at fixed sites, and from unexplained measurements."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from dataclasses import dataclass, field
 from typing import Literal
@@ -173,7 +171,7 @@ class BirthModel:
         return min(least, measured.max_existence, float(measured.expected) / (1.0 + clutter_rate))
 
     @classmethod
-    def none(cls, state_dim: int) -> BirthModel:
+    def none(cls, state_dim: int) -> "BirthModel":
         """Return the model without any births."""
         return cls(np.empty(0), *no_gaussians(state_dim))
 

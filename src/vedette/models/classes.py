@@ -1,7 +1,5 @@
 """Features of measurements that differ between classes of targets: reported classes and sizes."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """Poisson clutter: the model, and clutter that is uniform in measurement space."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
@@ -40,7 +38,6 @@ class ClutterSampler(Protocol):
         self, pose: Floats, measurement: MeasurementModel, *, state_dim: int, rng: np.random.Generator
     ) -> Floats:
         """Return (n, meas_dim) clutter measurements of a sensor at `pose`. `state_dim` is the length of states."""
-        ...
 
 
 @dataclass(frozen=True, slots=True, eq=False)

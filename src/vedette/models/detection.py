@@ -1,7 +1,5 @@
 """Detection models: probability that a sensor at a pose detects a target."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass, field
 

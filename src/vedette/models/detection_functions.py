@@ -1,7 +1,5 @@
 """The built-in detection functions, and their means over a Gaussian where a closed form is known."""
 
-from __future__ import annotations
-
 import math
 
 from vedette.kernels.base.compile import kernel

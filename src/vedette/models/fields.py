@@ -4,8 +4,6 @@
 the same part in a scenario reads and describes (`vedette.scenarios.sections.derived`).
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Iterator
 from functools import cache, partial
@@ -89,11 +87,11 @@ PositivePair: TypeAlias = ArrayLike
 NonNegativePair: TypeAlias = ArrayLike
 
 
-def part(kind: str, room: str, **names: str) -> Callable[[T], T]:
+def part(kind: str = "", room: str = "", **names: str) -> Callable[[T], T]:
     """Mark a class or a function as the part that `kind` selects in a section (`room`) of a scenario, such as "search".
 
-    names: fields or parameters with another name in a file, by their key. An angle whose key ends in `_deg` is in
-    degrees there.
+    Without them, it is the part of a section that has one kind only. names: fields or parameters with another name in a
+    file, by their key. An angle whose key ends in `_deg` is in degrees there.
     """
 
     def marked(made: T) -> T:

@@ -23,8 +23,6 @@ both. `out` has arbitrary contents: **every** entry must be written, zeros too.
 platform. `params` is the model's parameter vector.
 """
 
-from __future__ import annotations
-
 import inspect
 from collections.abc import Callable
 from typing import Any

@@ -1,7 +1,5 @@
 """Grid of equal cells over a region, and quadrature nodes for means over a cell."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 
@@ -38,7 +36,7 @@ class CellGrid:
         check_fields(self, "CellGrid.")
 
     @classmethod
-    def covering(cls, region: Region, cell_size: float) -> CellGrid:
+    def covering(cls, region: Region, cell_size: float) -> "CellGrid":
         """Return the grid with the fewest cells of at most `cell_size` m (above 0) per side. May raise `InputError`."""
         size = positive("cell_size", cell_size)
         instance("region", region, Region)

@@ -7,8 +7,6 @@ With offsets dx, dy, dz of the target from the sensor when the beam passes it, a
     bearing = atan2(dy, dx),  slant range = sqrt(g^2 + dz^2),  elevation = atan2(dz, g),  altitude = pz.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from typing import Any

@@ -4,8 +4,6 @@ States are [px, py, vx, vy] (the order of the paper's F and Q, paper-notes 1). T
 in rad/s, positive to the left. The model with height appends height and vertical velocity.
 """
 
-from __future__ import annotations
-
 import math
 from typing import Literal
 

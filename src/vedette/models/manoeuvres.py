@@ -3,8 +3,6 @@
 They are the usual modes of targets that change their motion (`vedette.models.modes`).
 """
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

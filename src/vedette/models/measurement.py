@@ -1,7 +1,5 @@
 """Measurement and noise models of a sensor at a pose."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
@@ -42,7 +40,7 @@ def _places(measurements: Floats, pose: Floats) -> Floats:
 
 
 @part("position", "measurement")
-def position() -> MeasurementModel:
+def position() -> "MeasurementModel":
     """z = [px, py] of the target in m, in the frame of the region. The sensor's pose has no effect."""
     functions = _position, np.empty(0), _position_jacobian
     return MeasurementModel(2, *functions, places=_places, is_linear=True, components=("x", "y"))

@@ -5,8 +5,6 @@ and `_NOISES`, dimension of its states, number of parameters of its transition, 
 states of the mixture, parameters of its transition, those of its noise]. A motion leaves other components as they are.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Any, NamedTuple
 

@@ -1,7 +1,5 @@
 """Motions of targets that change their mode: cruise, turn, stop or hide."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import lru_cache

@@ -1,7 +1,5 @@
 """Motion and survival models of a target."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 from functools import lru_cache
 

@@ -1,7 +1,5 @@
 """Built-in measurement noise: constant, or growing with the target's distance, as in the paper or axis by axis."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from vedette.errors import InputError

@@ -7,8 +7,6 @@ bearing and no line of sight: its range rate is 0 and its Jacobian rows are zero
 effect on the state.
 """
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Errors of measurements from errors of the sensor's own pose, such as those of a ship's navigation."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from typing import NamedTuple

@@ -4,8 +4,6 @@ A compiled function does not check indices, so an error in a user's function cou
 number. The checks call it once in plain Python, which checks indices, and once compiled, with an `out` full of NaN.
 """
 
-from __future__ import annotations
-
 import math
 from typing import Any
 

@@ -1,7 +1,5 @@
 """The surveillance region."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -4,8 +4,6 @@ Uniform in x, y is not uniform in bearing and range: the intensity at (bearing, 
 region and 0 outside (paper-notes 5). The intensity of bearings or ranges alone is its integral along the ray or arc.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """Scans whose measurements bring the covariance of their noise and the likelihood ratio of their features."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, fields
 from functools import cache
 from typing import TypeAlias
@@ -88,7 +86,7 @@ class ScanRows(SummaryRepr):
     def __len__(self) -> int:
         return len(self.values)
 
-    def __getitem__(self, rows: slice | Ints | Bools) -> ScanRows:
+    def __getitem__(self, rows: slice | Ints | Bools) -> "ScanRows":
         if not isinstance(rows, slice) and np.ndim(rows) != 1:
             raise IndexError(f"expected a slice, or an array of indices or flags; got {rows!r}")
         return _unchecked(*(each[rows] if len(each) else each for each in self.to_kernel()))

@@ -1,7 +1,5 @@
 """Sensor model: measurement, noise, detection and clutter."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass, field, replace
 from functools import lru_cache

@@ -4,8 +4,6 @@ The figure is a disc or a square, or the part of it within an angle of the headi
 rate / area inside and 0 outside. At (bearing, range) it includes the Jacobian, rate * range / area (paper-notes 5).
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """Evidence of signal-to-noise ratios that a measurement is of a target."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 

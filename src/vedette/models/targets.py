@@ -1,7 +1,5 @@
 """Target model: motion, survival and birth, shared by all filters."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 
 from vedette.errors import InputError

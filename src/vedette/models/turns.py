@@ -1,7 +1,5 @@
 """Turning radars: poses with a beam, and the time at which the beam points in a direction."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 

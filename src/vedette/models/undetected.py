@@ -1,7 +1,5 @@
 """Model of undetected targets on a grid: initial number, births, motion and survival."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 from functools import lru_cache

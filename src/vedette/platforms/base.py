@@ -3,8 +3,6 @@
 This is the only place where results of platforms are validated.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 from typing import Any, NamedTuple, Protocol, runtime_checkable
@@ -43,7 +41,7 @@ class Options(NamedTuple):
     scans: (num_courses, num_times) whether the actions of each course let the sensor scan.
     """
 
-    actions: Actions
+    actions: "Actions"
     courses: Floats
     which: Ints
     pose: Floats
@@ -54,7 +52,7 @@ class Options(NamedTuple):
         """Return the first action that leads to a course."""
         return int(np.flatnonzero(self.which == course)[0])
 
-    def at(self, times: slice) -> Options:
+    def at(self, times: slice) -> "Options":
         """Return the options at some of the times of their courses."""
         return self._replace(courses=np.ascontiguousarray(self.courses[:, times]), scans=self.scans[:, times])
 
@@ -67,13 +65,13 @@ class Abilities(NamedTuple):
     has_scans: bool
 
     @classmethod
-    def of(cls, platform: Platform) -> Abilities:
+    def of(cls, platform: "Platform") -> "Abilities":
         """Return the abilities of a platform."""
         return cls(*[provides(platform, more) for more in (SupportsManyActions, HasPrices, HasScans)])
 
 
 def options_at(
-    field: str, platform: Platform, pose: Floats, times: Floats, abilities: Abilities | None = None
+    field: str, platform: "Platform", pose: Floats, times: Floats, abilities: Abilities | None = None
 ) -> Options:
     """Return the options of a platform at a pose, distinguished by price, poses and scans at `times`, in s from now.
 
@@ -132,7 +130,7 @@ class Actions(SummaryRepr):
         object.__setattr__(self, "values", values)
 
     @classmethod
-    def of(cls, **numbers: float) -> Actions:
+    def of(cls, **numbers: float) -> "Actions":
         """Return a single action, as in `Actions.of(heading_deg=30.0)`."""
         return cls(tuple(numbers), np.array([list(numbers.values())]))
 
@@ -169,18 +167,15 @@ class Platform(Protocol):
     @property
     def columns(self) -> tuple[str, ...]:
         """Names of an action's numbers, such as `("heading_deg",)`. See `Actions`."""
-        ...
 
     def actions(self, pose: Floats) -> Floats:
         """Return (num_actions, num_columns) the possible actions at `pose`, at least one, in the order of tables."""
-        ...
 
     def course(self, pose: Floats, action: Floats, times: Floats) -> Floats:
         """Return (num_times, 3 or more) the poses `times` seconds after it began `action` at `pose`.
 
         action: one row of `actions`. Components of the pose beyond those returned stay as they are.
         """
-        ...
 
 
 @runtime_checkable
@@ -189,7 +184,6 @@ class SupportsManyActions(Protocol):
 
     def courses(self, pose: Floats, actions: Floats, times: Floats) -> Floats:
         """Return (num_actions, num_times, 3 or more) poses for actions (num_actions, num_columns)."""
-        ...
 
 
 @runtime_checkable
@@ -198,7 +192,6 @@ class HasPrices(Protocol):
 
     def prices(self, actions: Floats) -> Floats:
         """Return prices (num_actions,) in units of the reward, of actions (num_actions, num_columns)."""
-        ...
 
 
 @runtime_checkable
@@ -207,7 +200,6 @@ class HasScans(Protocol):
 
     def scans(self, pose: Floats, actions: Floats, times: Floats) -> Bools:
         """Return (num_actions, num_times) whether the sensor scans at `times`, s after each action began at `pose`."""
-        ...
 
 
 def check_platform(field: str, platform: Any) -> None:

@@ -1,7 +1,5 @@
 """Platforms whose actions are given as compass courses: clockwise from true north, with speeds in m/s."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Cameras that turn and zoom, fixed or mounted, with pose [px, py, heading_rad, pointing_rad, half_width_rad]."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass

@@ -4,8 +4,6 @@ The library measures angles counter-clockwise from the x axis of the plane. Char
 clockwise from true north at the position of the sensor, which differs from the y axis away from the origin.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 from typing import Protocol, runtime_checkable
@@ -25,11 +23,9 @@ class Compass(Protocol):
 
         `place` may also be an array of poses, whose first two components are used.
         """
-        ...
 
     def azimuth(self, angle: ArrayLike, place: ArrayLike) -> Floats:
         """Return azimuths, rad in [-pi, pi], of angles in the plane: the inverse of `angle`."""
-        ...
 
 
 @dataclass(frozen=True, slots=True)

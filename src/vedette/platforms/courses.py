@@ -1,7 +1,5 @@
 """Motion at constant speed: the platform turns instantly and keeps its heading (paper section IV)."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 

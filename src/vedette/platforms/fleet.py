@@ -1,7 +1,5 @@
 """The moving platforms of a run."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
@@ -61,6 +59,6 @@ class Fleet:
             off[s] = not scans_of(f"sensors[{s}].platform", platform, self.starts[s], rows, seconds)[0, 0]
         return off
 
-    def follow(self, actions: Sequence[Floats | None], time: float) -> Fleet:
+    def follow(self, actions: Sequence[Floats | None], time: float) -> "Fleet":
         """Return the fleet that begins new actions at `time`, s, from its poses then."""
         return replace(self, starts=self.poses(time), actions=tuple(actions), since=time)

@@ -1,7 +1,5 @@
 """Platforms whose actions have prices, and whose sensors can be switched off or have a limited scanning time."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """Platforms that track the time since they last visited each of several places."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any

@@ -1,7 +1,5 @@
 """Sequences of actions: the actions of a platform over several decisions, as one action."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Platforms that move by steps, along a path, or not at all."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 

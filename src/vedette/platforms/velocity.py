@@ -1,7 +1,5 @@
 """Platforms of sensors that measure range rates, which are relative to the velocity of the sensor."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Base of platforms that add components to the poses of another platform."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

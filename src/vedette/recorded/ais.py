@@ -1,7 +1,5 @@
 """AIS messages of ships (NMEA 0183) as tables of positions."""
 
-from __future__ import annotations
-
 import math
 from datetime import UTC, datetime
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Plots, service messages and tracks of radars (ASTERIX) as tables."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Iterator
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Recordings of ROS 2 (rosbag2) as tables: detections with positions, and position reports of receivers."""
 
-from __future__ import annotations
-
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
 from typing import Any

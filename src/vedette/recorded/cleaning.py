@@ -1,7 +1,5 @@
 """Tracks from recorded reports: removal of jumps, silences, moored ships and reports outside the region."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """Columns of a table of scans: their quantities and units, and checks that they suit the sensors' measurements."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 
 import numpy as np

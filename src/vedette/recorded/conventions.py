@@ -1,7 +1,5 @@
 """Units, directions and column names in the rows of a recording."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass

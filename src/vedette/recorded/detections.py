@@ -1,7 +1,5 @@
 """Detections of Stone Soup as a table of scans, without importing Stone Soup."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterable, Sequence
 from typing import Any, TypeAlias

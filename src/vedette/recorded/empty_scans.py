@@ -1,7 +1,5 @@
 """Scans without a row, from the period of a sensor where its rows have a regular one."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

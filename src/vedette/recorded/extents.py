@@ -1,7 +1,5 @@
 """Places and extent of measurements in the plane, and rows of a recording far beyond all others."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

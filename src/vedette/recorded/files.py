@@ -1,7 +1,5 @@
 """Files of tables of records: CSV, Parquet, AIS, ASTERIX and ROS 2 bags."""
 
-from __future__ import annotations
-
 import csv
 import hashlib
 import io

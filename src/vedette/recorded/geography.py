@@ -1,7 +1,5 @@
 """Longitude and latitude, and metres in the plane that touches the Earth at an origin (WGS 84)."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 from functools import lru_cache

@@ -1,7 +1,5 @@
 """Merging of several returns of one target in a scan, as filters assume points with one measurement each."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import replace
@@ -23,7 +21,7 @@ class Spread(NamedTuple):
     num: int = 0
     squares: float = 0.0
 
-    def __add__(self, other: Any) -> Spread:
+    def __add__(self, other: Any) -> "Spread":
         return Spread(self.num + other.num, self.squares + other.squares)
 
     @property

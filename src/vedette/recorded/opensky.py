@@ -1,7 +1,5 @@
 """Tables of state vectors of the OpenSky Network: ADS-B reports of aircraft."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from dataclasses import replace
 from typing import Any

@@ -1,7 +1,5 @@
 """Recorded positions of real targets: columns of a table as checked arrays."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass

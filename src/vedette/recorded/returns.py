@@ -1,7 +1,5 @@
 """Extent of targets that give several returns in a scan, learnt from the scans of a recording."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator, Sequence
 from typing import NamedTuple

@@ -1,7 +1,5 @@
 """Rows of measurements, in any units and conventions, as filters take them."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace

@@ -1,7 +1,5 @@
 """Recorded scans in order of time, and their correction for the biases of the sensors."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
@@ -146,7 +144,7 @@ class RecordedScans(SummaryRepr):
             f"{pluralise(len(self.skipped), 'row')} skipped"
         )
 
-    def between(self, begin: float, end: float) -> RecordedScans:
+    def between(self, begin: float, end: float) -> "RecordedScans":
         """Return the instants from `begin` to before `end`, s of `times`. Their times start at 0."""
         low, high = np.searchsorted(self.times, [begin, end]).tolist()
         first = float(self.times[low]) if low < high else 0.0

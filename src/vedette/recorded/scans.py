@@ -1,7 +1,5 @@
 """Scans of sensors, built from rows of measurements."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """Places that give measurements all through a recording, such as land, buoys and anchored ships."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """Tables of records, and the values of their cells."""
 
-from __future__ import annotations
-
 import numbers
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field

@@ -1,7 +1,5 @@
 """Recorded trajectories as targets: aircraft, ships, or anything that reports its position."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from datetime import UTC, datetime
@@ -75,7 +73,7 @@ class RecordedTargets:
         time_origin: float | str | None = None,
         cleaning: Cleaning | None = None,
         sha256: str | None = None,
-    ) -> RecordedTargets:
+    ) -> "RecordedTargets":
         """Return targets from a file with columns time, id and x, y or longitude, latitude (and optionally vx, vy).
 
         Args:
@@ -102,7 +100,7 @@ class RecordedTargets:
         origin_deg: tuple[float, float] | None = None,
         time_origin: float | str | None = None,
         cleaning: Cleaning | None = None,
-    ) -> RecordedTargets:
+    ) -> "RecordedTargets":
         """Return targets from columns in memory, a mapping or a data frame. See `from_file`.
 
         Messages count rows from 1.

@@ -1,7 +1,5 @@
 """The loop over recorded scans: for each instant, a step of the tracker and an estimate."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
@@ -44,7 +42,7 @@ class Tracking:
         if not np.array_equal(self.truth.times, self.recording.times):
             raise InputError("truth: expected the times of the recording; got others")
 
-    def first(self, num: int) -> Tracking:
+    def first(self, num: int) -> "Tracking":
         """Return the tracking of only the first `num` instants."""
         later = [*self.recording.times[: num + 1].tolist(), np.inf][num]
         return replace(self, recording=self.recording.between(0.0, later), truth=self.truth.first(num))

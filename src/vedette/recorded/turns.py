@@ -1,7 +1,5 @@
 """Turning radars in recordings: find the turn in bearings and times, and group rows into scans of one turn each."""
 
-from __future__ import annotations
-
 import math
 from typing import Literal, NamedTuple
 

@@ -1,7 +1,5 @@
 """The results of a benchmark as one HTML file."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Explanation of a decision as the plain data that the page shows."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from typing import Any

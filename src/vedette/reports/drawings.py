@@ -1,7 +1,5 @@
 """Figures of a report, for the page and for files."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """Forest plot of strategies: the error of each, and its paired difference to the first on a shared axis."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """Runs of a campaign grouped for comparison, or a single run as a group of its own."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass

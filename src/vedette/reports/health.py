@@ -1,7 +1,5 @@
 """Diagnostics of a group as a table: one check per row, one strategy per column."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 

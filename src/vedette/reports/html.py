@@ -1,7 +1,5 @@
 """The report as one HTML file."""
 
-from __future__ import annotations
-
 import base64
 import hashlib
 import itertools

@@ -1,7 +1,5 @@
 """Page of a live loop: the replay view with the present state instead of a run."""
 
-from __future__ import annotations
-
 import hashlib
 import json
 import math

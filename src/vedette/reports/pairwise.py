@@ -1,7 +1,5 @@
 """Pairwise comparisons of strategies: a verdict, the paired difference and a sentence for each pair."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal

@@ -1,7 +1,5 @@
 """Provenance of a campaign: a table of its sessions, its specification as TOML, and the citation."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Mapping
 from typing import Any

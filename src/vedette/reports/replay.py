@@ -1,7 +1,5 @@
 """A run as the plain data for the replay on the page, scan by scan."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from typing import Any

@@ -1,7 +1,5 @@
 """Figures of a report as files for a paper, and its tables as Markdown and CSV."""
 
-from __future__ import annotations
-
 import hashlib
 from collections.abc import Iterable
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Report of a single run: the page of a campaign's report, for one strategy in one setting."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any

@@ -1,7 +1,5 @@
 """Matplotlib figures as inline elements of a page, with its light and dark colours and unique ids."""
 
-from __future__ import annotations
-
 import base64
 import html
 import re

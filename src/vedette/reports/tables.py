@@ -1,7 +1,5 @@
 """Tables of a report: errors and other metrics per strategy, computation time, and the most frequent decisions."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """The clutter of sensors whose file gives none, estimated from the recording."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping, Sequence
 from pathlib import Path as FilePath

@@ -1,7 +1,5 @@
 """Sections that a sensors file does not give, assumed from its scans, with a description of each."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping, Sequence
 from pathlib import Path as FilePath

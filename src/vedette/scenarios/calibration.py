@@ -1,7 +1,5 @@
 """Parameters of the sensors in a sensors file that `calibrate` estimates, and the file with the estimates."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path as FilePath

@@ -1,7 +1,5 @@
 """Checks of the custom code that a scenario names: import it and build its parts."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from functools import partial

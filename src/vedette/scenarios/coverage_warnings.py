@@ -1,7 +1,5 @@
 """Warnings of sensors of a recording whose given coverages have no place in common."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator
 

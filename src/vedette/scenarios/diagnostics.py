@@ -1,7 +1,5 @@
 """One fault of a scenario file, and how values are named in messages."""
 
-from __future__ import annotations
-
 import json
 from datetime import date, time
 from typing import Any, NamedTuple

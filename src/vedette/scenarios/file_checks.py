@@ -1,7 +1,5 @@
 """Checks of the files that a scenario names: recorded targets, and custom models."""
 
-from __future__ import annotations
-
 import ast
 import csv
 import os

@@ -1,7 +1,5 @@
 """Scenarios of recorded or future scans: a sensors file, completed from the scans."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path as FilePath

@@ -1,7 +1,5 @@
 """Generated scenes: any number of sensors and targets, made from a seed by the same rules."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 

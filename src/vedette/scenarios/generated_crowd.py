@@ -1,7 +1,5 @@
 """Generated crowds: any number of targets, of a given density, before one sensor."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 

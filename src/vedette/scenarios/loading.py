@@ -1,7 +1,5 @@
 """Scenarios from files and by name."""
 
-from __future__ import annotations
-
 import os
 from collections.abc import Mapping
 from dataclasses import dataclass

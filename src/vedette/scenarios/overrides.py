@@ -1,7 +1,5 @@
 """A scenario with some of its fields changed, each named by its path, such as `sensors.*.clutter.rate`."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Mapping
 from typing import Any

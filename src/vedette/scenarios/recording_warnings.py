@@ -1,7 +1,5 @@
 """Warnings of oddities in the recorded targets and scans of a scenario that a run accepts."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 import numpy as np

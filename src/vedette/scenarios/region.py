@@ -1,7 +1,5 @@
 """The region of recorded or future scans, from the measurements or from the sensors' ranges."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping
 from pathlib import Path as FilePath
 

@@ -1,7 +1,5 @@
 """Sensors files: YAML files with `sensors` and any other section of a scenario, but without its time and targets."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path as FilePath

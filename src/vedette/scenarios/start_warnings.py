@@ -1,7 +1,5 @@
 """Warnings of moving sensors that start at a place that the constraints forbid."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 
 import numpy as np

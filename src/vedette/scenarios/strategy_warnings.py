@@ -1,7 +1,5 @@
 """Warnings of strategies that a run of this scenario refuses."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 from vedette.errors import InputError

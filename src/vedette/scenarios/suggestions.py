@@ -1,7 +1,5 @@
 """Alternatives that a warning recommends: only those with which the scenario is valid."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping
 from typing import Any
 

@@ -1,7 +1,5 @@
 """The code that a scenario names, and whether other users may have changed it."""
 
-from __future__ import annotations
-
 import os
 import stat
 from collections.abc import Iterator

@@ -1,7 +1,5 @@
 """Warnings of valid but implausible settings: wrong units, exchanged numbers, squared standard deviations."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator
 from typing import Any

@@ -1,7 +1,5 @@
 """Faults of a configuration's data: the errors of its sections, with the words and paths of the file."""
 
-from __future__ import annotations
-
 import difflib
 import re
 import types

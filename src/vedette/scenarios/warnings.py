@@ -1,7 +1,5 @@
 """Warnings of valid settings in a scenario that cost accuracy or are probably mistakes."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterable, Iterator
 from itertools import combinations

@@ -1,7 +1,5 @@
 """Sections of a scenario in a few words: `limited range, probability 0.9, range 5000 m`."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from itertools import pairwise
 

@@ -4,8 +4,6 @@ The result has only mappings, lists, words, numbers, true/false and null; a tag 
 aliases work. All faults that leave the text readable (a repeated key, a foreign tag) are reported together.
 """
 
-from __future__ import annotations
-
 import re
 from collections.abc import Iterator
 from dataclasses import dataclass, field

@@ -1,7 +1,5 @@
 """The zones of a scenario, for drawings."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 from vedette.scenarios.coastline import coastline

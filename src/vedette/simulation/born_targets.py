@@ -1,7 +1,5 @@
 """Targets drawn anew in every run: random births, motion, deaths and exits."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Posterior Cramer-Rao bound over several scans: recursion of covariances at the true states."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 

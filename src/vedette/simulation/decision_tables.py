@@ -1,7 +1,5 @@
 """Decisions of a run as tables of columns, and back: the available actions and their expected rewards."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from graphlib import CycleError, TopologicalSorter

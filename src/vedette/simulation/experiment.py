@@ -1,7 +1,5 @@
 """Experiment: everything a run needs except a planner and a seed."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 
 import numpy as np

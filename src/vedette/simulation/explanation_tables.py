@@ -4,8 +4,6 @@ A run has all of these tables or, if its decisions were not explained, none. Run
 none.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any

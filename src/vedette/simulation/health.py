@@ -1,7 +1,5 @@
 """Reports of the filters and the fusion of a run: truncation errors, clutter floors, missing labels."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, fields
 from operator import attrgetter
@@ -74,13 +72,13 @@ class Health(SummaryRepr):
         return f"of {pluralise(num_scans, 'scan')}, {pluralise(num_sensors, 'sensor')}"
 
     @classmethod
-    def unreported(cls, num_scans: int, num_sensors: int) -> Health:
+    def unreported(cls, num_scans: int, num_sensors: int) -> "Health":
         """Return reports that are all zero, to be filled scan by scan."""
         shapes = {name: (num_scans,) if name in FUSION_COLUMNS else (num_scans, num_sensors) for name in _DTYPES}
         arrays: dict[str, Any] = {name: np.zeros(shape, _DTYPES[name]) for name, shape in shapes.items()}
         return cls(**arrays)
 
-    def first(self, num_scans: int) -> Health:
+    def first(self, num_scans: int) -> "Health":
         """Return the reports of the first scans."""
         return Health(**{name: getattr(self, name)[:num_scans] for name in _DTYPES})
 
@@ -128,7 +126,7 @@ class Health(SummaryRepr):
                 raise InputError(f"record.health.{name}: expected {dtype} of {shape}; got {array.dtype} {array.shape}")
 
 
-_DTYPES = {field.name: np.dtype(np.float64 if field.type == "Floats" else np.int64) for field in fields(Health)}
+_DTYPES = {field.name: np.dtype(np.float64 if field.type == Floats else np.int64) for field in fields(Health)}
 _KINDS = {name: Kind.NUMBER if dtype == np.float64 else Kind.INTEGER for name, dtype in _DTYPES.items()}
 _OF_SCANS = ("num_clutter_floored", "num_duplicates")  # summed over the sensors
 _OF_FILTER = tuple(field.name for field in fields(FilterInfo) if field.name in _DTYPES)

@@ -1,7 +1,5 @@
 """Journal of a run in progress, so that a run that stops leaves a record of the finished scans."""
 
-from __future__ import annotations
-
 import sysconfig
 import traceback
 from collections.abc import Callable, Sequence

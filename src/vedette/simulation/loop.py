@@ -1,7 +1,5 @@
 """Simulation loop: scans, a step of the tracker, an estimate, and at decision times a plan (paper, Algorithm 1)."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from functools import partial
 from typing import Any, NamedTuple

@@ -1,7 +1,5 @@
 """Oracle planner that knows the true targets: a lower bound for control, to compare plans with."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field, replace
 from typing import ClassVar, NamedTuple
 
@@ -16,7 +14,7 @@ from vedette.control import (
     Plan,
     PlanningSettings,
 )
-from vedette.control.constraints import Mask, nearest_feasible
+from vedette.control.constraints.mask import Mask, nearest_feasible
 from vedette.control.inputs import check_control_inputs, check_poses, mask_of_decision, options_of
 from vedette.densities import Estimator, best_estimate
 from vedette.errors import InputError
@@ -107,7 +105,7 @@ class OraclePlanner:
         """Motion model of the targets in the filters."""
         return common_target_model([sensor.filter for sensor in self.sensors]).motion
 
-    def with_truth(self, truth: Truth) -> OraclePlanner:
+    def with_truth(self, truth: Truth) -> "OraclePlanner":
         """Return the planner for the targets of a run."""
         return replace(self, truth=truth)
 

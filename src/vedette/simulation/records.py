@@ -1,7 +1,5 @@
 """Records of runs."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Any, NamedTuple, Protocol
 
@@ -201,4 +199,3 @@ class Measure(Protocol):
 
     def __call__(self, record: RunRecord) -> Any:
         """(num_scans,) numbers, NaN where undefined."""
-        ...

@@ -1,7 +1,5 @@
 """Reference trackers for comparison: one that knows the true targets, and one that only uses the last scan."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
@@ -80,7 +78,7 @@ class OracleFilter(_Reference):
     truth: Truth | None = None
     _covs: dict[int, Floats] = field(init=False, default_factory=dict, repr=False)
 
-    def with_truth(self, truth: Truth) -> OracleFilter:
+    def with_truth(self, truth: Truth) -> "OracleFilter":
         """Return the filter for the targets of a run."""
         return replace(self, truth=truth)
 

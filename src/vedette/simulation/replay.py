@@ -1,7 +1,5 @@
 """Scans of a finished run, drawn again, as a record contains estimates but no measurements."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from functools import partial
 

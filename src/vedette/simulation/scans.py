@@ -1,7 +1,5 @@
 """Simulated scans: detections with noise and bias, and clutter."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import overload

@@ -1,7 +1,5 @@
 """Runs as Arrow files, one per table: the files of a saved run, and of a run stored in a campaign."""
 
-from __future__ import annotations
-
 from collections.abc import Collection, Iterator, Mapping
 from contextlib import contextmanager
 from typing import Any

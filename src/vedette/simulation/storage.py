@@ -5,8 +5,6 @@ table of `vedette.simulation.tables`, `timings.arrow` and, if given, `scenario.y
 manifest states it (`stopped`). A folder is written atomically.
 """
 
-from __future__ import annotations
-
 import contextlib
 import hashlib
 import itertools

@@ -6,8 +6,6 @@ of the first sensor. For many sensors, rewards of a single sensor's actions are 
 `decision_tables` for decisions and `explanation_tables` for their explanations.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from itertools import pairwise
 from typing import Any, TypeAlias

@@ -1,7 +1,5 @@
 """Motion of true targets: over one step, and through the modes of a motion."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

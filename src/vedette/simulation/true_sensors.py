@@ -1,7 +1,5 @@
 """True sensors of the simulation, which may differ from the sensor models of the filters."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Literal
@@ -47,7 +45,7 @@ class TrueSensor:
             if getattr(self.bias, name) and name not in self.model.measurement.components:
                 raise reject(f"TrueSensor.bias.{name}", f"0, as no {name} is measured", getattr(self.bias, name))
 
-    def at_first_scan(self) -> TrueSensor:
+    def at_first_scan(self) -> "TrueSensor":
         """Return the sensor at its first scan."""
         if self.first_detection is None:
             return self

@@ -1,7 +1,5 @@
 """Densities of the true targets: the filters' labels of them, and a planner that decides on such densities."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 from typing import Any, ClassVar, NamedTuple
 
@@ -64,7 +62,7 @@ class TrueTargetsPlanner:
             truth = with_components(self.truth, check_sensors(self.sensors).state_dim)
             object.__setattr__(self, "truth", truth)
 
-    def with_truth(self, truth: Truth) -> TrueTargetsPlanner:
+    def with_truth(self, truth: Truth) -> "TrueTargetsPlanner":
         """Return the planner for the targets of a run."""
         return replace(self, truth=truth)
 

@@ -1,7 +1,5 @@
 """True targets: the truth of a run, and targets that follow a motion model."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Protocol
@@ -59,11 +57,11 @@ class Truth(SummaryRepr):
         first, end = self.offsets[scan : scan + 2].tolist()
         return np.ones(end - first) if self.detection_factors is None else self.detection_factors[first:end]
 
-    def first(self, num_scans: int) -> Truth:
+    def first(self, num_scans: int) -> "Truth":
         """Return the truth of the first scans."""
         return self.between(0, num_scans)
 
-    def between(self, first: int, end: int) -> Truth:
+    def between(self, first: int, end: int) -> "Truth":
         """Return the truth of the scans from `first`, counted from 0, to the one before `end`."""
         rows = slice(self.offsets[first], self.offsets[end])
         offsets = self.offsets[first : end + 1] - self.offsets[first]
@@ -87,7 +85,9 @@ class Truth(SummaryRepr):
             raise reject("Truth.ids", f"each id once in scan {scan}", self.at(scan)[0])
 
     @classmethod
-    def from_arrays(cls, times: Floats, alive: Bools, states: Floats, detection_factors: Floats | None = None) -> Truth:
+    def from_arrays(
+        cls, times: Floats, alive: Bools, states: Floats, detection_factors: Floats | None = None
+    ) -> "Truth":
         """Return the truth for (num_targets, num_scans) flags and (num_targets, num_scans, state_dim) states.
 
         Row i is target i. detection_factors: (num_targets, num_scans), or None as in `Truth`.
@@ -103,7 +103,6 @@ class TargetSource(Protocol):
 
     def truth(self, times: ArrayLike, *, rng: np.random.Generator) -> Truth:
         """Return the targets at each of (num_scans,) increasing scan times in seconds."""
-        ...
 
 
 def scan_times(times: ArrayLike) -> Floats:

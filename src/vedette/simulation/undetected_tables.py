@@ -1,7 +1,5 @@
 """Intensity of undetected targets at the decisions of a run as a table of columns, and back."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any

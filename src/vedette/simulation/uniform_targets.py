@@ -1,7 +1,5 @@
 """Steady number of targets, uniform over the region at all times while individual targets come and go."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

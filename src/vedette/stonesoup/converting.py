@@ -1,7 +1,5 @@
 """Conversion of Stone Soup target and sensor models into Vedette models, for the tracker and the sensor manager."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Literal, TypeAlias

@@ -1,7 +1,5 @@
 """A Stone Soup sensor manager that uses Vedette's planners."""
 
-from __future__ import annotations
-
 import copy
 import datetime
 import itertools

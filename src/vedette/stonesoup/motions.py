@@ -3,8 +3,6 @@
 Its noise is that of an acceleration that is white in continuous time. Its coefficients are spectral densities.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
@@ -60,7 +58,7 @@ class StateLayout:
         """Return covariances in Vedette's order, shape (n, state_dim, state_dim)."""
         return np.ascontiguousarray(np.asarray(covs, np.float64)[:, self.order][:, :, self.order])
 
-    def inverse(self) -> StateLayout:
+    def inverse(self) -> "StateLayout":
         """Return the inverse layout."""
         return StateLayout(tuple(int(place) for place in np.argsort(self.order)))
 

@@ -1,7 +1,5 @@
 """Conversion of Stone Soup detections and ground truth into scans, poses and truth."""
 
-from __future__ import annotations
-
 import datetime
 from collections.abc import Iterable
 from dataclasses import dataclass, field

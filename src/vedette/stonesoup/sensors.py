@@ -4,8 +4,6 @@ Its bearings are counter-clockwise from the x axis as in Vedette, but relative t
 Measurements are rotated by the `rotation_offset` (`vedette.recorded.detections.elements_of`), and the pose uses it.
 """
 
-from __future__ import annotations
-
 import math
 from typing import Any
 

@@ -1,7 +1,5 @@
 """A Stone Soup tracker that uses Vedette's filters and fusion rules."""
 
-from __future__ import annotations
-
 import datetime
 from collections import Counter
 from typing import Any

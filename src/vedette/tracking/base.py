@@ -1,7 +1,5 @@
 """Protocol of trackers, their state and report, timing of the stages of a step, and checks of its input."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -88,16 +86,13 @@ class Tracker(Protocol):
     @property
     def targets(self) -> TargetModel:
         """Target model that all sensors share."""
-        ...
 
     @property
     def sensors(self) -> tuple[SensorModel, ...]:
         """Model of each sensor, in the order of scans and poses."""
-        ...
 
     def initial(self) -> State:
         """Return the state before the first scan."""
-        ...
 
     def step(
         self, state: State, scans: Sequence[Any], poses: Any, time: float, *, rngs: Sequence[np.random.Generator]
@@ -122,7 +117,6 @@ class Tracker(Protocol):
             ModelError, NumericalError: from the filters and the fusion. Every exception has a note with the stage that
                 raised it (`vedette.tracking.failed_stage`).
         """
-        ...
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -1,7 +1,5 @@
 """Networks of sensors that send their beliefs: fusion of the received beliefs, or consensus."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any, NamedTuple

@@ -1,7 +1,5 @@
 """Velocities of births from range rates, and positions of births at the scan time of a turning radar."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Any
 

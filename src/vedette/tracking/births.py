@@ -1,7 +1,5 @@
 """Births from measurements: birth candidates from the measurements of all sensors that no track explains."""
 
-from __future__ import annotations
-
 import math
 from collections import defaultdict
 from collections.abc import Sequence

@@ -1,7 +1,5 @@
 """Central tracker: one filter processes the scans of all sensors. It is the reference for every fusion of beliefs."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Protocol, runtime_checkable
@@ -31,16 +29,13 @@ class CentralFilter(Protocol):
     @property
     def targets(self) -> TargetModel:
         """Target model."""
-        ...
 
     @property
     def sensors(self) -> tuple[SensorModel, ...]:
         """Model of each sensor."""
-        ...
 
     def initial(self) -> Any:
         """Return the belief before the first scans."""
-        ...
 
     def step(
         self, belief: Any, scans: Any, poses: Any, dt: float, step: int, *, rng: np.random.Generator
@@ -49,7 +44,6 @@ class CentralFilter(Protocol):
 
         For births from measurements, a further argument `births` is the LMB of all birth candidates.
         """
-        ...
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -108,7 +102,7 @@ class Central(MultiSensorFilterTracker):
     Attributes and errors: as in `MultiSensorFilterTracker`.
     """
 
-    def with_truth(self, truth: Any) -> Central:
+    def with_truth(self, truth: Any) -> "Central":
         """Return the tracker with a run's true targets passed to its filter, if the filter takes them, else itself."""
         return replace(self, filter=self.filter.with_truth(truth)) if hasattr(self.filter, "with_truth") else self
 

@@ -1,7 +1,5 @@
 """Tracker with delayed scans: it continues with the scans that have arrived and adds late ones on arrival."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace

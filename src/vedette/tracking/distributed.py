@@ -1,7 +1,5 @@
 """Distributed tracker: every sensor filters its own scans, and the beliefs are fused (paper, Algorithm 1)."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any

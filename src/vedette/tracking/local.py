@@ -1,7 +1,5 @@
 """Local filters of all sensors: step, prediction and update of each sensor's belief."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any

@@ -1,7 +1,5 @@
 """Lost labels, and the expected number of targets without a label on a grid."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Any, TypeVar
 

@@ -1,7 +1,5 @@
 """Merging of beliefs with different histories, and fusions with replaced weights."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import fields, is_dataclass, replace
 from typing import Any

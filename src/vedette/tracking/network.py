@@ -1,7 +1,5 @@
 """Radio links between sensors: connectivity, message delays and uncompressed bytes sent."""
 
-from __future__ import annotations
-
 import math
 from collections import defaultdict
 from collections.abc import Collection, Sequence

@@ -1,7 +1,5 @@
 """Tracking with scans in any order of arrival: the steps since the time of a late scan are computed again."""
 
-from __future__ import annotations
-
 import math
 from bisect import bisect_left
 from collections.abc import Iterable

@@ -1,7 +1,5 @@
 """Tracker that runs as a separate program in any language: it gets the scans of a time as a line of JSON."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Hashable, Sequence
 from dataclasses import dataclass, field
 from math import nan

@@ -1,7 +1,5 @@
 """Networks of sensors that send their scans: each sensor filters all scans that it receives, in order of time."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple

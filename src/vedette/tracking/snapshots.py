@@ -5,8 +5,6 @@ as shared, because some trackers recognise equal beliefs by identity. Nothing is
 constructors of the library's own data classes, with their checks.
 """
 
-from __future__ import annotations
-
 import json
 import os
 from collections.abc import Callable, Mapping

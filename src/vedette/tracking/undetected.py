@@ -1,7 +1,5 @@
 """Tracker that maintains the intensity of undetected targets where beliefs have none, for planners that search."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any

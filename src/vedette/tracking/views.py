@@ -1,7 +1,5 @@
 """Tracker that maintains the time since the last scan of each label, for the constraint on revisits of targets."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any

@@ -1,7 +1,5 @@
 """Rewards of joint actions from the table of changes, and the searches that this structure makes cheap."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass, replace
 from typing import Any
@@ -67,11 +65,11 @@ class AdditiveRewards:
         values = self.reward.coefficients if provides(self.reward, LinearReward) else None
         return None if values is None else np.asarray(values, np.float64)
 
-    def joint(self) -> AdditiveRewards:
+    def joint(self) -> "AdditiveRewards":
         """Return the rewards of all sensors, fused: this object."""
         return self
 
-    def alone(self, sensor: int) -> AdditiveRewards:
+    def alone(self, sensor: int) -> "AdditiveRewards":
         """Return the rewards of one sensor alone, compared with the prediction."""
         first, last = self.table.first_courses[sensor : sensor + 2].tolist()
         offsets = self.table.offsets[first : last + 1]

@@ -1,7 +1,5 @@
 """Starting point of a decision by sums over labels: beliefs without scans, samples, and sensors evaluated as one."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from functools import lru_cache
 from typing import Any, NamedTuple
@@ -47,13 +45,13 @@ class Samples(NamedTuple):
     @classmethod
     def draw(
         cls, fused: Any, sensors: Sequence[MobileSensor], settings: PlanningSettings, *, rng: np.random.Generator
-    ) -> Samples:
+    ) -> "Samples":
         """Draw `num_samples` samples and propagate them over the horizon without noise."""
         drawn, states = draw_paths(fused, sensors, settings, rng=rng)
         return cls(states, drawn.offsets, targets_of(fused.tracks.labels, drawn.labels, drawn.offsets))
 
     @classmethod
-    def none(cls, fused: Any, settings: PlanningSettings) -> Samples:
+    def none(cls, fused: Any, settings: PlanningSettings) -> "Samples":
         """Return one sample without targets, for rewards that need no samples."""
         states = np.empty((settings.horizon_steps, 0, fused.state_dim))
         return cls(states, np.zeros(2, np.int64), np.full((fused.tracks.num_tracks, 1), -1))

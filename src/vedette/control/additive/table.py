@@ -1,7 +1,5 @@
 """The changes of a decision: the effect of each course's scans on each label in reach, and on each cell."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Limit on the number of sensors that may scan after a decision."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import ClassVar, NamedTuple

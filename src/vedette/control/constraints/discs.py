@@ -1,7 +1,5 @@
 """Probability mass of a Gaussian within a disc."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Feasible joint actions, by course and by pair of courses, and the search for one near a given joint action."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any, NamedTuple, TypeVar

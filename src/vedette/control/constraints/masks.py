@@ -1,7 +1,5 @@
 """The mask of feasible joint actions from the answers of several constraints."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from typing import Any

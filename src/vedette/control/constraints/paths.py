@@ -4,8 +4,6 @@ A shortest path among polygons is straight except for bends at their convex corn
 An algorithm for planning collision-free paths among polyhedral obstacles, Communications of the ACM 22 (1979) 560-570).
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
@@ -42,7 +40,7 @@ class VisibilityGraph:
     before: Ints
 
     @classmethod
-    def of(cls, zones: Sequence[Sequence[Floats]]) -> VisibilityGraph:
+    def of(cls, zones: Sequence[Sequence[Floats]]) -> "VisibilityGraph":
         """Return the graph of zones, each the interior of polygons (num_corners, 2), m, by the even-odd rule."""
         from scipy.sparse.csgraph import shortest_path
 
@@ -64,7 +62,7 @@ class VisibilityGraph:
         lengths, before = shortest_path(links, method="D", return_predecessors=True)
         return cls(edges, nodes, coast, lengths, np.asarray(before, np.int64))
 
-    def to(self, goals: Floats, start: Floats) -> Paths:
+    def to(self, goals: Floats, start: Floats) -> "Paths":
         """Return the paths from near a start (2,) to goals (num_goals, 2), m.
 
         A goal inside a zone, or one that no path reaches, is approached as closely as paths from the start allow.

@@ -1,7 +1,5 @@
 """The protocol of constraints, and the data that they are evaluated on."""
 
-from __future__ import annotations
-
 import math
 from itertools import accumulate
 from typing import NamedTuple, Protocol, TypeVar, runtime_checkable
@@ -72,20 +70,16 @@ class Constraint(Protocol):
     @property
     def name(self) -> str:
         """Name of the constraint in messages."""
-        ...
 
     @property
     def needs_beliefs(self) -> bool:
         """Whether it uses `ConstraintContext.beliefs`."""
-        ...
 
     def courses(self, situation: ConstraintContext) -> tuple[Bools, ...]:
         """Return (num_courses,) the allowed courses of each sensor, one array per sensor."""
-        ...
 
     def pairs(self, situation: ConstraintContext, first: int, second: int) -> Bools | None:
         """Return (num_courses of first, of second) the compatible courses of two sensors. None: all."""
-        ...
 
 
 @runtime_checkable
@@ -95,7 +89,6 @@ class RangeLimitedConstraint(Protocol):
     @property
     def interaction_range(self) -> float:
         """Distance in m within which courses may be incompatible. 0: never. Without this member there is no limit."""
-        ...
 
 
 @runtime_checkable
@@ -105,7 +98,6 @@ class TimeInvariantConstraint(Protocol):
     @property
     def time_invariant(self) -> bool:
         """Whether answers depend only on poses and courses, not on times or beliefs, False without this member."""
-        ...
 
 
 @runtime_checkable
@@ -117,7 +109,6 @@ class QuantifiedConstraint(Protocol):
 
     def violations(self, situation: ConstraintContext) -> tuple[Floats, ...]:
         """Return (num_courses,) the violation of each course, one array per sensor, above 0 if it is not allowed."""
-        ...
 
 
 @runtime_checkable
@@ -127,7 +118,6 @@ class ZoneConstraint(Protocol):
     @property
     def zone(self) -> tuple[Floats, ...]:
         """Polygons (num_corners, 2), m, whose interior by the even-odd rule is forbidden, edges included."""
-        ...
 
 
 @runtime_checkable
@@ -137,7 +127,6 @@ class ActivationConstraint(Protocol):
     @property
     def most_active(self) -> int:
         """Number of sensors, at least 1."""
-        ...
 
 
 def interaction_range_of(constraint: Constraint) -> float:

@@ -1,7 +1,5 @@
 """Regions that platforms must stay inside, and regions that they must not enter."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any, ClassVar

@@ -1,7 +1,5 @@
 """Places and targets that sensors must visit repeatedly."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass

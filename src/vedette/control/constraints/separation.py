@@ -1,7 +1,5 @@
 """Minimum distance between platforms."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import ClassVar
 

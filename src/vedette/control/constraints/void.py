@@ -1,7 +1,5 @@
 """Sensors that keep their distance from targets, by the probability that a disc around a sensor is free of them."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import ClassVar
 

@@ -1,7 +1,5 @@
 """Beam search over sequences: an ascent over the sensors, whose lines are searched by beams."""
 
-from __future__ import annotations
-
 import itertools
 import math
 from dataclasses import dataclass
@@ -10,7 +8,7 @@ import numpy as np
 
 from vedette.control.lookahead.courses import Sequence
 from vedette.control.lookahead.problem import JointSequence, SequenceProblem
-from vedette.control.search import tie_tolerance
+from vedette.control.search.problem import tie_tolerance
 from vedette.models.fields import Checked, Count
 
 

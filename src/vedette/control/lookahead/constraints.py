@@ -1,24 +1,19 @@
 """Context of constraints at later decisions: poses after earlier courses, and the belief predicted to that time."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
 import numpy as np
 
-from vedette.control.constraints import (
-    Active,
+from vedette.control.constraints.active import Active, active_of
+from vedette.control.constraints.mask import Mask
+from vedette.control.constraints.masks import courses_allowed, feasible_action_mask, pairs_allowed
+from vedette.control.constraints.protocol import (
     Constraint,
     ConstraintContext,
-    Mask,
     TimeInvariantConstraint,
-    active_of,
-    courses_allowed,
-    feasible_action_mask,
     interaction_range_of,
-    pairs_allowed,
 )
 from vedette.control.inputs import predicted_beliefs
 from vedette.control.settings import MobileSensor, PlanningSettings

@@ -1,7 +1,5 @@
 """The course sequences of one sensor over several decisions, as a tree that grows where it is visited."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 from typing import TypeAlias
@@ -56,7 +54,7 @@ class CourseTree:
     _open: dict[tuple[bytes, int], tuple[Sequence, bool]] = field(default_factory=dict)
     _blocked: dict[tuple[bytes, int], int] = field(default_factory=dict)
 
-    def with_dead_ends(self) -> CourseTree:
+    def with_dead_ends(self) -> "CourseTree":
         """Return the tree that includes dead ends."""
         return replace(self, omits_dead_ends=False, _allowed={})
 

@@ -1,7 +1,5 @@
 """Joint sequences that constraints allow, pairs of sensors included, and the search for one of them."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator
 from collections.abc import Sequence as Several
@@ -11,8 +9,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from vedette.control.constraints import Mask, infeasible_note, nearest_feasible, relaxed
-from vedette.control.constraints.mask import depth_first
+from vedette.control.constraints.mask import Mask, depth_first, nearest_feasible, relaxed
+from vedette.control.constraints.masks import infeasible_note
 from vedette.control.lookahead.constraints import MultiStepConstraints
 from vedette.control.lookahead.courses import CourseTree, Sequence
 from vedette.kernels.base.types import Bools
@@ -44,7 +42,7 @@ class FeasibleSequences:
     _single: dict[tuple[int, Sequence], bool] = field(default_factory=dict)
 
     @classmethod
-    def of(cls, trees: tuple[CourseTree, ...], ahead: MultiStepConstraints) -> FeasibleSequences:
+    def of(cls, trees: tuple[CourseTree, ...], ahead: MultiStepConstraints) -> "FeasibleSequences":
         """Return the feasible sequences of trees without constraints.
 
         Dead ends are left out, unless this leaves pairs of sensors no feasible courses at the first decision. If no

@@ -1,7 +1,5 @@
 """Joint decisions over several periods, whose first actions are taken: open-loop receding horizon."""
 
-from __future__ import annotations
-
 import copy
 import itertools
 import math
@@ -11,7 +9,8 @@ from typing import ClassVar, NamedTuple
 
 import numpy as np
 
-from vedette.control.constraints import Constraint, visibility_graph
+from vedette.control.constraints.paths import visibility_graph
+from vedette.control.constraints.protocol import Constraint
 from vedette.control.decisions import combine_parts
 from vedette.control.evaluator import Evaluator
 from vedette.control.evidence import Evidence, Part
@@ -24,8 +23,8 @@ from vedette.control.lookahead.problem import Best, JointSequence, PrecomputedCo
 from vedette.control.plan import Plan
 from vedette.control.preparation import AnyReward, PlanningBeliefs, check_sums, planning_beliefs, state_notes
 from vedette.control.problem import searched, upper_bound
-from vedette.control.rewards import ExpectedLossReward
-from vedette.control.search import AutomaticSearch
+from vedette.control.rewards.power import ExpectedLossReward
+from vedette.control.search.ascent import AutomaticSearch
 from vedette.control.settings import MobileSensor, PlanningSettings
 from vedette.errors import NumericalError
 from vedette.fusion import Fusion

@@ -1,7 +1,5 @@
 """The search problem over joint sequences: its evaluations and its results."""
 
-from __future__ import annotations
-
 import itertools
 import math
 from collections.abc import Callable, Iterable
@@ -16,7 +14,7 @@ from vedette.control.explanation import Bound
 from vedette.control.lookahead.courses import CourseTree, Sequence
 from vedette.control.lookahead.feasibility import FeasibleSequences
 from vedette.control.plan import SearchCurve
-from vedette.control.search import first_best
+from vedette.control.search.problem import first_best
 from vedette.kernels.base.types import Bools, Floats, Ints
 from vedette.kernels.planning.ascent import Cells
 from vedette.platforms import Options
@@ -268,4 +266,3 @@ class SequenceSearch(Protocol):
 
     def search(self, problem: SequenceProblem, *, rng: np.random.Generator) -> None:
         """Evaluate whole joint sequences, at least one, within the budget."""
-        ...

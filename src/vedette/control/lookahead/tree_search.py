@@ -1,7 +1,5 @@
 """Monte Carlo tree search over the joint sequences, one sensor's course at a time, decision by decision."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass, field
 from typing import Literal
@@ -55,7 +53,7 @@ class _Node:
     num_known: int = 0  # number of visits with known values
     total: float = 0.0  # sum of these values
     closed: bool = False  # whether all sequences below are evaluated
-    children: dict[int, _Node] = field(default_factory=dict)
+    children: "dict[int, _Node]" = field(default_factory=dict)
 
 
 class _Climb:

@@ -1,7 +1,5 @@
 """Protocols of rewards, and the value of a planned update."""
 
-from __future__ import annotations
-
 import math
 import numbers
 from collections.abc import Sequence
@@ -45,11 +43,9 @@ class PowerReward(Protocol):
     @property
     def exponents(self) -> Exponents:
         """The required pairs (a, b)."""
-        ...
 
     def combine(self, z: Floats) -> Floats:
         """Return rewards (...) of z (..., num_exponents)."""
-        ...
 
 
 @runtime_checkable
@@ -63,21 +59,17 @@ class LabelReward(Protocol):
     @property
     def function(self) -> ModelFunction:
         """Function of kind `label_reward`: see `vedette.models.model_function`."""
-        ...
 
     @property
     def params(self) -> Floats:
         """Parameter vector of the function."""
-        ...
 
     @property
     def num_terms(self) -> int:
         """Number of terms that a label adds."""
-        ...
 
     def combine(self, sums: Floats) -> Floats:
         """Return rewards (...) of sums over the labels (..., num_terms)."""
-        ...
 
 
 @runtime_checkable
@@ -87,7 +79,6 @@ class HasUnitVolume(Protocol):
     @property
     def unit_volume(self) -> UnitVolume:
         """K: a number, or "reference" for `vedette.divergence.reference_unit_volume` of the prediction."""
-        ...
 
 
 @runtime_checkable
@@ -97,7 +88,6 @@ class HasMissedCost(Protocol):
     @property
     def missed_cost(self) -> float:
         """Cost in units of the reward, at least 0."""
-        ...
 
 
 @runtime_checkable
@@ -110,7 +100,6 @@ class LinearReward(Protocol):
     @property
     def coefficients(self) -> Sequence[float] | Floats | None:
         """Coefficients (num,) of the combined numbers. None, as without this member: the reward is not linear."""
-        ...
 
 
 def check_unit_volume(value: Any) -> None:

@@ -1,7 +1,5 @@
 """Divergences that are made of power integrals, and the expected loss after the scans, in closed form."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import ClassVar
 

@@ -1,14 +1,12 @@
 """Coordinate ascent, one sensor at a time, and the automatic choice of a search by the number of sensors."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from vedette.control.constraints import Active
+from vedette.control.constraints.active import Active
 from vedette.control.search.problem import Joint, JointProblem, RewardCache, best_of_all, tie_tolerance
 from vedette.models.fields import Checked, Count, Repeats, part
 

@@ -1,13 +1,11 @@
 """Cross-entropy search: joint actions are drawn from a distribution that moves towards the best of them."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 
 import numpy as np
 
-from vedette.control.constraints import Mask
+from vedette.control.constraints.mask import Mask
 from vedette.control.search.problem import JointProblem, RewardCache
 from vedette.kernels.base.types import Floats, Ints
 from vedette.models.fields import Chance, Checked, Count, Portion, part

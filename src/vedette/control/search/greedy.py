@@ -1,7 +1,5 @@
 """Sequential greedy search: one sensor after the other, once."""
 
-from __future__ import annotations
-
 import heapq
 from collections.abc import Callable
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """The search problem over joint actions, with the mean rewards found so far."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -9,7 +7,7 @@ from typing import NamedTuple, Protocol, runtime_checkable
 
 import numpy as np
 
-from vedette.control.constraints import Mask, nearest_feasible, relaxed
+from vedette.control.constraints.mask import Mask, nearest_feasible, relaxed
 from vedette.errors import InputError
 from vedette.kernels.base.types import Floats, Ints
 from vedette.models.fields import Checked, Count, part
@@ -71,7 +69,6 @@ class JointSearch(Protocol):
 
     def search(self, problem: JointProblem, *, rng: np.random.Generator) -> tuple[int, ...]:
         """Return the joint action to take, one action per sensor, of equally good ones the first in printed order."""
-        ...
 
 
 def all_joint_actions(shape: tuple[int, ...]) -> Ints:

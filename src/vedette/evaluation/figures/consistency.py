@@ -1,7 +1,5 @@
 """Figure of the consistency of estimates with their covariances, over time."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 
 from matplotlib.axes import Axes
@@ -20,7 +18,7 @@ from vedette.evaluation.figures.style import (
     span_times,
     styled,
 )
-from vedette.evaluation.metrics import AverageNees
+from vedette.evaluation.metrics.consistency import AverageNees
 from vedette.kernels.base.types import Floats
 
 

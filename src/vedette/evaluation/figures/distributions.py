@@ -1,7 +1,5 @@
 """Figure of the error of each run by strategy, and of its paired difference from the first strategy."""
 
-from __future__ import annotations
-
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure

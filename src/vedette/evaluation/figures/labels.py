@@ -1,7 +1,5 @@
 """Labels of strategies in figures: as papers write them, short enough for a legend."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 from vedette.evaluation.figures.style import strategy_label

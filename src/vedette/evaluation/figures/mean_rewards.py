@@ -1,7 +1,5 @@
 """Figure of a strategy's rewards at its decisions, averaged over its runs."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Figures of the error of the strategies over time (paper Fig. 5)."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """Figure of the reward of each action at one decision (paper Fig. 4)."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from typing import Any
 

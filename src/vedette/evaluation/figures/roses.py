@@ -1,7 +1,5 @@
 """Figure of the chosen headings or actions and their frequencies: one rose for each strategy and decision."""
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Sequence
 from typing import Any

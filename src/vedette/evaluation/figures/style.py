@@ -1,7 +1,5 @@
 """Common style of all figures: as wide as a paper's column, 8 pt, colours safe for colour blindness and grey print."""
 
-from __future__ import annotations
-
 import io
 import shutil
 import warnings

@@ -1,7 +1,5 @@
 """Figure of the error against a number that a campaign varies."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 

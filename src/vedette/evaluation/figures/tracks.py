@@ -1,7 +1,5 @@
 """Figures of the paths of targets and sensors, and of the estimates (paper Fig. 3)."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Optimal assignment between two sets of points, the basis of all distances between sets."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -4,8 +4,6 @@ Y. Bar-Shalom, X.-R. Li and T. Kirubarajan, "Estimation with Applications to Tra
 section 5.4.2: the error, its average over runs, and the chi-square test of both.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

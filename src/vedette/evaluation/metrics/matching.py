@@ -1,7 +1,5 @@
 """Matching of a run's estimates with targets at each scan, the basis of all metrics of pairs and of labels."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 

@@ -4,8 +4,6 @@ A. S. Rahmathullah, A. F. Garcia-Fernandez and L. Svensson, "Generalized optimal
 20th Int. Conf. on Information Fusion, 2017: Definition 1 for the distance, Proposition 1 for the parts.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, fields
 

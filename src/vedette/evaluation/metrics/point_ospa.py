@@ -4,8 +4,6 @@ D. Schuhmacher, B.-T. Vo and B.-N. Vo, "A Consistent Metric for Performance Eval
 IEEE Trans. Signal Processing 56(8), 2008: eq. (3) and (4) for the distance, section III-C for the parts.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 

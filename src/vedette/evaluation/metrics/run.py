@@ -1,7 +1,5 @@
 """All metrics of a run at each scan, and custom metrics."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
 
@@ -118,7 +116,7 @@ class RunMetrics(SummaryRepr):
         """Return the arrays by name, in the order above: float64, or int64 for counts. Custom metrics come last."""
         return {**{name: getattr(self, name) for name in COLUMNS}, **self.custom}
 
-    def with_custom(self, record: RunRecord, added: Sequence[Metric]) -> RunMetrics:
+    def with_custom(self, record: RunRecord, added: Sequence[Metric]) -> "RunMetrics":
         """Return the metrics with custom metrics of the run's record added. Those with the same names are replaced.
 
         Raises `InputError` or `VedetteError` as `Metric.evaluate` does.
@@ -126,7 +124,7 @@ class RunMetrics(SummaryRepr):
         return replace(self, custom={**self.custom, **{metric.name: metric.evaluate(record) for metric in added}})
 
     @classmethod
-    def from_columns(cls, columns: Mapping[str, NDArray[np.float64] | NDArray[np.int64]]) -> RunMetrics:
+    def from_columns(cls, columns: Mapping[str, NDArray[np.float64] | NDArray[np.int64]]) -> "RunMetrics":
         """Return the metrics from the arrays that `columns` returns, in any order.
 
         Raises `InputError` for a missing name, a wrong type, or unequal lengths.
@@ -144,7 +142,7 @@ class RunMetrics(SummaryRepr):
 
 
 COLUMNS = {
-    each.name: np.dtype(np.float64 if each.type == "Floats" else np.int64)
+    each.name: np.dtype(np.float64 if each.type == Floats else np.int64)
     for each in fields(RunMetrics)
     if each.name != "custom"
 }

@@ -1,7 +1,5 @@
 """Serialisation of a run's metrics as an Arrow file, stored next to the run. They can be computed again from it."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Time until a new target is first tracked, the metric for search."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

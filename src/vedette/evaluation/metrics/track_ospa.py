@@ -4,8 +4,6 @@ M. Beard, B.-T. Vo and B.-N. Vo, "A Solution for Large-Scale Multi-Object Tracki
 2020: the time-averaged OSPA as distance between tracks, and the OSPA between sets of tracks with this base distance.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -50,13 +48,13 @@ class TrackSet:
             raise InputError(f"{name}: expected finite positions")
 
     @classmethod
-    def from_truth(cls, truth: Truth) -> TrackSet:
+    def from_truth(cls, truth: Truth) -> "TrackSet":
         """Return one track per target, by its id."""
         tracks = np.unique(truth.ids, return_inverse=True)[1].reshape(-1)
         return cls._from_rows(tracks, np.diff(truth.offsets), truth.states)
 
     @classmethod
-    def from_estimates(cls, estimates: Sequence[Estimate]) -> TrackSet:
+    def from_estimates(cls, estimates: Sequence[Estimate]) -> "TrackSet":
         """Return one track per label. estimates: one per scan."""
         counts = np.array([estimate.num_targets for estimate in estimates], np.int64)
         if not counts.any():
@@ -66,7 +64,7 @@ class TrackSet:
         return cls._from_rows(tracks, counts, np.concatenate([estimate.means[:, :2] for estimate in estimates]))
 
     @classmethod
-    def _from_rows(cls, tracks: Ints, counts: Ints, states: Floats) -> TrackSet:
+    def _from_rows(cls, tracks: Ints, counts: Ints, states: Floats) -> "TrackSet":
         scans = np.repeat(np.arange(len(counts)), counts)
         alive = np.zeros((tracks.max(initial=-1) + 1, len(counts)), np.bool_)
         positions = np.zeros((*alive.shape, 2))
@@ -74,7 +72,7 @@ class TrackSet:
         positions[tracks, scans] = states[:, :2]
         return cls(alive, positions)
 
-    def within(self, start: int, stop: int) -> TrackSet:
+    def within(self, start: int, stop: int) -> "TrackSet":
         """Return the tracks that exist at any of the scans `start` to `stop - 1`, over these scans."""
         present = self.alive[:, start:stop].any(axis=1)
         return TrackSet(self.alive[present, start:stop], self.positions[present, start:stop])

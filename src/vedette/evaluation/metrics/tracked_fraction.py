@@ -1,7 +1,5 @@
 """Share of visible targets that are tracked, the metric for fusion of different fields of view."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 

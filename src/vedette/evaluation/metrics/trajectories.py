@@ -5,8 +5,6 @@ Metrics", EURASIP J. Image and Video Processing, 2008 (mismatches), and to Y. Li
 associate: HybridBoosted multi-target tracker for crowded scene", CVPR 2009 (fragments).
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 

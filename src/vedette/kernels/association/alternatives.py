@@ -8,8 +8,6 @@ where w_vo are the weights of the options of a row. Versions of a label exclude 
 one factor are ignored.
 """
 
-from __future__ import annotations
-
 import math
 from typing import NamedTuple
 

@@ -5,8 +5,6 @@ twice. Every row lists its options by descending log weight. The column of an op
 row may take, or negative (absent, missed), which any row may take: as if each row had its own column for it.
 """
 
-from __future__ import annotations
-
 import math
 from typing import NamedTuple
 

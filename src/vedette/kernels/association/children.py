@@ -1,7 +1,5 @@
 """Prior hypotheses and the joint choices (children) that follow from them at a scan."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Clusters of rows that compete for the same measurements, and working arrays for their marginals."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

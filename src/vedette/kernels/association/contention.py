@@ -11,8 +11,6 @@ marginals. Only the mutual exclusion of groups is lost. With marginals a_g(j), t
 then have an L1 error of 4 a_1(j) a_2(j), and more groups at most this summed over pairs.
 """
 
-from __future__ import annotations
-
 import math
 from typing import NamedTuple
 

@@ -6,8 +6,6 @@ its track. Therefore the heaviest hypothesis of every association is kept as wel
 with its result at the scan: missed, or detected as a given measurement, theta(label) of Vo, Vo, Hoang 2017.
 """
 
-from __future__ import annotations
-
 import math
 from typing import NamedTuple
 

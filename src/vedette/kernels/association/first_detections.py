@@ -9,8 +9,6 @@ against clutter, and its density is P_D g(z | .) D / rho (Williams 2015, eq. 36-
 candidate label with two options, absent or detected as that measurement, and no option of a miss.
 """
 
-from __future__ import annotations
-
 import math
 from typing import NamedTuple
 

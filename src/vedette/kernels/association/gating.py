@@ -6,8 +6,6 @@ relative to the spread of the scan. A row considers those between the ends of it
 axes.
 """
 
-from __future__ import annotations
-
 import math
 from typing import NamedTuple
 

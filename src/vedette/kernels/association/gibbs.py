@@ -4,8 +4,6 @@ Each parent's chain starts at its optimal assignment, so the heaviest choice is 
 given the others, and every distinct state is kept once. Samples are divided by the square root of the prior weight.
 """
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Concatenation of rows of a scan with their options, such as first detections after tracks."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from vedette.kernels.association.assignment import Options

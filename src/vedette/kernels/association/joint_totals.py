@@ -1,7 +1,5 @@
 """Share of a hypothesis's joint choices that take no measurement twice. Each sum is shared by all hypotheses."""
 
-from __future__ import annotations
-
 import math
 from typing import NamedTuple
 

@@ -9,8 +9,6 @@ target that it most likely is, by the assignment of the least sum of squared dis
 them opens a new place.
 """
 
-from __future__ import annotations
-
 import math
 from typing import NamedTuple
 

@@ -10,8 +10,6 @@ All others are linked. `vedette.kernels.association.contention` handles measurem
 may still take.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

@@ -6,8 +6,6 @@ too large for that is summed over its heaviest joint choices, in exact order. Th
 certain because a choice was left out (`vedette.kernels.association.truncation_bound`).
 """
 
-from __future__ import annotations
-
 import math
 from typing import Any, NamedTuple
 

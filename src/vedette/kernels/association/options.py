@@ -3,8 +3,6 @@
 This is the part of the joint prediction and update that all filters share (Vo, Vo, Hoang 2017, eq. 25-27 and 33-35).
 """
 
-from __future__ import annotations
-
 import math
 from typing import NamedTuple
 

@@ -4,8 +4,6 @@ Survivors precede birth sites. The weights of a row include death of the track, 
 over the rows predicts and updates jointly (Vo, Vo, Hoang 2017, section III-C).
 """
 
-from __future__ import annotations
-
 import math
 from typing import NamedTuple
 

@@ -1,7 +1,5 @@
 """Products of the hypotheses of several independent factors, heaviest first."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from vedette.kernels.association.children import Parents

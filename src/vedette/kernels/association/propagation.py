@@ -9,8 +9,6 @@ until mu converges. Then P(i is j) is proportional to w_ij mu_ij, and P(i is not
 is the number of options, however many rows compete. The iteration always converges, to a unique fixed point.
 """
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -7,8 +7,6 @@ whose second choice is far off stay near the root, so that one more hypothesis c
 docs/devdocs/ranked-search.md.
 """
 
-from __future__ import annotations
-
 import math
 from typing import NamedTuple
 

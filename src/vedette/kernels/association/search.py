@@ -1,7 +1,5 @@
 """Working arrays of the best-first search for the heaviest joint choices: opened parents, nodes, and the heap."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Start of a ranking search, and preparation of a prior hypothesis at its first visit."""
 
-from __future__ import annotations
-
 import math
 
 from vedette.kernels.association.assignment import DualWork, Options

@@ -1,7 +1,5 @@
 """Total weight of all joint choices of a scan, including those that were not found."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Selection of the joint choices of a scan that are kept as hypotheses."""
 
-from __future__ import annotations
-
 import math
 from typing import NamedTuple
 

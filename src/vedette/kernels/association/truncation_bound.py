@@ -1,7 +1,5 @@
 """Weight that a sum over the heaviest joint choices of a cluster leaves out: its bound, and safe marginals."""
 
-from __future__ import annotations
-
 import math
 
 from vedette.kernels.association.assignment import ABSENT, DualWork, Options, solve_assignment

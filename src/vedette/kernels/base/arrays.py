@@ -1,7 +1,5 @@
 """Small array helpers with explicit loops, which compile in a tenth of the time of their NumPy counterparts."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from vedette.kernels.base.compile import inlined, kernel

@@ -4,8 +4,6 @@ At every call Numba determines the types of the arguments. Its fast path does no
 path through all fields took longer than a whole LMB scan (120 of 177 microseconds per call).
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Folders of compiled kernels: in the user's cache, and next to the package if installed with it."""
 
-from __future__ import annotations
-
 import hashlib
 import os
 import sys

@@ -1,7 +1,5 @@
 """Progress of compilation for a listener, as a start that compiles takes minutes and should not look stuck."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, replace

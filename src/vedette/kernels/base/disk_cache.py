@@ -4,8 +4,6 @@ Entries are found by the sources they were compiled from (`vedette.kernels.base.
 is read only if no other user can have written it, see `vedette.kernels.base.private_files`.
 """
 
-from __future__ import annotations
-
 import contextlib
 import hashlib
 import pickle
@@ -53,7 +51,7 @@ class _PackageLocator:
         return str(self._line)
 
     @classmethod
-    def from_function(cls, function: Callable[..., Any], file: str) -> _PackageLocator | None:
+    def from_function(cls, function: Callable[..., Any], file: str) -> "_PackageLocator | None":
         path = package_file(file)
         return None if path is None else cls(function, path)
 

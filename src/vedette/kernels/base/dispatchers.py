@@ -3,8 +3,6 @@
 Imported when the first of them is called, compiled or read from disk.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Any, cast
 
@@ -79,7 +77,7 @@ class WholeKernel(CPUDispatcher):  # type: ignore[misc]
     _shape: Shape = None
 
     @classmethod
-    def of(cls, function: Callable[..., Any], options: dict[str, Any]) -> WholeKernel:
+    def of(cls, function: Callable[..., Any], options: dict[str, Any]) -> "WholeKernel":
         """Return the whole kernel of a function."""
         whole = cls(function, targetoptions=options)
         whole._cache = LazyCache(function)
@@ -123,7 +121,7 @@ class ModelDispatcher(WholeKernel):
     model: ModelFunction
 
     @classmethod
-    def of_model(cls, model: ModelFunction, options: dict[str, Any]) -> ModelDispatcher:
+    def of_model(cls, model: ModelFunction, options: dict[str, Any]) -> "ModelDispatcher":
         """Return the dispatcher of a model function."""
         dispatcher: ModelDispatcher = cls.of(model.py_func, options)
         dispatcher.model = model
@@ -133,7 +131,7 @@ class ModelDispatcher(WholeKernel):
         return {**super()._reduce_states(), "kind": self.model.kind}
 
     @classmethod
-    def _rebuild(cls, kind: str, **states: Any) -> ModelDispatcher:
+    def _rebuild(cls, kind: str, **states: Any) -> "ModelDispatcher":
         """Restore from a pickle in another process, locked, so that no other thread sees it incomplete."""
         with global_compiler_lock:
             dispatcher: ModelDispatcher = super()._rebuild(**states)

@@ -4,8 +4,6 @@ Within two units in the last place of the exact values. Calling the system's fun
 vectorisation of the whole loop.
 """
 
-from __future__ import annotations
-
 import math
 from typing import NamedTuple
 

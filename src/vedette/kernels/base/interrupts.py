@@ -1,7 +1,5 @@
 """Deferral of Ctrl-C during work that must not be interrupted."""
 
-from __future__ import annotations
-
 import signal
 import threading
 from collections.abc import Iterator

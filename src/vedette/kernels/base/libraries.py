@@ -5,8 +5,6 @@ this, level by level. Here code that only kernels call stays a *part*, unoptimis
 kernel that Python calls is a *whole* of all the parts that it reaches.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any
@@ -92,7 +90,7 @@ class WholeLibrary(JITCodeLibrary):  # type: ignore[misc]
         )
 
     @classmethod
-    def _unserialize(cls, codegen: Any, state: tuple[str, str, Any]) -> WholeLibrary:
+    def _unserialize(cls, codegen: Any, state: tuple[str, str, Any]) -> "WholeLibrary":
         name, _, (code, defined) = state
         library: WholeLibrary = codegen.create_library(name)
         library.enable_object_caching()

@@ -6,8 +6,6 @@ Ctrl-C then crashed the process with a segmentation fault. The boxing here runs 
 before or after it, and is faster.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any

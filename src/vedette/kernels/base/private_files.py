@@ -4,8 +4,6 @@ A place is private if only this user, root and the owner of the source (whose co
 systems without owners and modes every place counts as private.
 """
 
-from __future__ import annotations
-
 import os
 import stat
 from functools import cache

@@ -1,7 +1,5 @@
 """A model function at many states in one call, as a call from Python costs more than most functions compute."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

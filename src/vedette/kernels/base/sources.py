@@ -3,8 +3,6 @@
 Numba stamps cache entries only with the source file of the function itself, and so misses edits in imported files.
 """
 
-from __future__ import annotations
-
 import hashlib
 import re
 from collections.abc import Callable

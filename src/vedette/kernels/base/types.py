@@ -3,8 +3,6 @@
 Ragged data is flat with offsets (CSR): the entries of item `i` are `offsets[i]:offsets[i + 1]`.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Sequence
 from typing import Any, NamedTuple
 

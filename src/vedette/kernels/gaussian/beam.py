@@ -7,8 +7,6 @@ turn rate in component 9 (rad/s, counter-clockwise positive). With a shorter pos
 of the scan have one time.
 """
 
-from __future__ import annotations
-
 import math
 from typing import NamedTuple
 

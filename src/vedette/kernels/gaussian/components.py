@@ -3,8 +3,6 @@
 Code that changes the weight or the moments of a component copies it first, so that its other columns come along.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

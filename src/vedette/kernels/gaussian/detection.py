@@ -1,7 +1,5 @@
 """Probability that a sensor detects a target whose state has a Gaussian density."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Distances between Gaussians, and of mixtures of them."""
 
-from __future__ import annotations
-
 import math
 from typing import NamedTuple
 

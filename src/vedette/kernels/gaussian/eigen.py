@@ -1,7 +1,5 @@
 """Eigenvalues of the small symmetric matrices of tracking."""
 
-from __future__ import annotations
-
 import math
 
 from vedette.kernels.base.compile import borrowing

@@ -10,8 +10,6 @@ with d = m - reference: Y = P^-1, y = Y d, s = d'Yd + log det(2 pi P), w = 1. Th
 small: taken near the densities, log integrals are as exact at coordinates of 1e6 m as at the origin.
 """
 
-from __future__ import annotations
-
 import math
 
 from vedette.kernels.base.compile import borrowing, inlined

@@ -1,7 +1,5 @@
 """Expected measurement of a Gaussian and its update: extended, unscented and cubature Kalman filters."""
 
-from __future__ import annotations
-
 import math
 from typing import NamedTuple
 

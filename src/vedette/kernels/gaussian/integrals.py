@@ -4,8 +4,6 @@ See `vedette.kernels.gaussian.information` for what a row holds. Of `num` rows a
 entry of all of them next to each other.
 """
 
-from __future__ import annotations
-
 import math
 from typing import NamedTuple
 

@@ -1,7 +1,5 @@
 """Posterior covariance as a sum of squares, without cancellation (Joseph's form)."""
 
-from __future__ import annotations
-
 from vedette.kernels.base.compile import borrowing
 from vedette.kernels.base.types import Floats
 from vedette.kernels.gaussian.linalg import sandwich

@@ -4,8 +4,6 @@ Inside a compiled loop these are two orders of magnitude faster than `@` and `np
 Triangular results use the lower triangle only. The strict upper triangle is left as it was.
 """
 
-from __future__ import annotations
-
 import math
 
 from vedette.kernels.base.compile import borrowing, inlined

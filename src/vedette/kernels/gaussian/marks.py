@@ -11,8 +11,6 @@ The mode of a component is drawn at its first prediction (`vedette.kernels.gauss
 distributed as at birth.
 """
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

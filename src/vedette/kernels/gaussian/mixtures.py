@@ -1,7 +1,5 @@
 """Gaussian mixtures: their moments, the order of their weights, and whether their covariances are valid."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -5,8 +5,6 @@ mode j. Components of one mode are then merged. If all of them are, this is the 
 Bar-Shalom (1988).
 """
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Tracks as single Gaussians, and pools of weighted tracks, each reduced to one track."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

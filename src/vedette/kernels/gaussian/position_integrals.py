@@ -1,7 +1,5 @@
 """Means over a Gaussian of functions of the position: in closed form, along rays, and by nodes."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Prediction of Gaussians: the Chapman-Kolmogorov step of extended, unscented and cubature Kalman filters."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Gaussian mixtures and intensities with fewer components: pruning, merging and capping."""
 
-from __future__ import annotations
-
 import math
 from typing import NamedTuple
 

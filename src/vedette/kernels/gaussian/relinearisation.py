@@ -6,8 +6,6 @@ linearisation filter (Garcia-Fernandez, Svensson, Morelande and Sarkka 2015): wh
 to the noise. Mean, covariance and likelihood are then those of a Kalman filter with this linear measurement.
 """
 
-from __future__ import annotations
-
 import math
 from typing import NamedTuple
 

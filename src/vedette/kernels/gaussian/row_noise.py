@@ -5,8 +5,6 @@ measured. For it, an update has a variance so large that it has no effect, and t
 for the density of so wide a Gaussian, while clutter has the density of the other components.
 """
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Simulated scans from true measurements (random numbers are drawn outside), and checks of scans."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

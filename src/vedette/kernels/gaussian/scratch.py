@@ -1,7 +1,5 @@
 """Working arrays of the Gaussian kernels, and angles."""
 
-from __future__ import annotations
-
 import math
 from typing import NamedTuple
 

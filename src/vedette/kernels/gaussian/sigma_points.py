@@ -5,8 +5,6 @@ positive definite), CUBATURE the 2 n points of the third-degree rule (Arasaratna
 Jacobians and no points. SWITCHED does too, except for a Gaussian over which measurements bend (`innovation.bends`).
 """
 
-from __future__ import annotations
-
 import math
 from typing import NamedTuple
 

@@ -1,7 +1,5 @@
 """LMBs of births: from measurements, and within a period."""
 
-from __future__ import annotations
-
 import math
 from typing import NamedTuple
 

@@ -1,7 +1,5 @@
 """Distribution of the total number of targets of independent densities."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from vedette.kernels.base.compile import kernel

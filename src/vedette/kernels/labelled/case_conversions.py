@@ -1,7 +1,5 @@
 """Conversion of many GLMBs to LMBs at once."""
 
-from __future__ import annotations
-
 import math
 from typing import NamedTuple
 

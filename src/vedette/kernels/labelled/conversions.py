@@ -1,7 +1,5 @@
 """Conversions between labelled densities: delta-GLMB to marginalised GLMB and to LMB, products to GLMB."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -5,8 +5,6 @@ distinguish the two, so such a pair would remain forever. As a density of unlabe
 hypotheses that hold the second label and not the first give its track the first label.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from vedette.kernels.base.compile import borrowing, kernel

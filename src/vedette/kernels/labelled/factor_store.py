@@ -1,7 +1,5 @@
 """Store in which a factored density is written factor by factor."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

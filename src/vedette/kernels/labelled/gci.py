@@ -6,8 +6,6 @@ a Gaussian for every combination of components. With cubature points, each Gauss
 moments that f = q (f / q) has under it, where 0 < f / q <= 1.
 """
 
-from __future__ import annotations
-
 import math
 from typing import NamedTuple
 

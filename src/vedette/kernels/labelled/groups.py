@@ -1,7 +1,5 @@
 """Group-wise sums of weights given as logs."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Heaviest product of hypotheses, one from each factor, with a given total number of targets."""
 
-from __future__ import annotations
-
 import math
 from typing import NamedTuple
 

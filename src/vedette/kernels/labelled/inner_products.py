@@ -5,8 +5,6 @@ being a's. Everything is in the log domain: inner products of 4-D tracks in SI u
 power of the number of targets. `log_unit_volume` is log K, K the unit of hyper-volume of the paper's eq. 5.
 """
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Labels and label sets of a GLMB: grouping of hypotheses, ordering of labels."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from vedette.kernels.base.compile import kernel

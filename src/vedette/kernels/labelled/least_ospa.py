@@ -4,8 +4,6 @@ With n estimated targets of which M are in place, and N true ones, OSPA^p is the
 is the heaviest hypothesis of n targets, for the n with the largest mean of M / max(n, N).
 """
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

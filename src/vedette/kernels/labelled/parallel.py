@@ -11,8 +11,6 @@ A posterior that is a mixture contributes a sum of such terms, one per component
 component for each choice of a component at every sensor, of which the likeliest are followed.
 """
 
-from __future__ import annotations
-
 import math
 from typing import NamedTuple
 

@@ -12,8 +12,6 @@ weights and information rows scaled by its sensor's power. A product is then a s
 rows of one label share one reference.
 """
 
-from __future__ import annotations
-
 import math
 from typing import NamedTuple
 

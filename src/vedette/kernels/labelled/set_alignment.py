@@ -1,7 +1,5 @@
 """Alignment of marginalised GLMBs of several sensors, or products of them, on the union of their label sets."""
 
-from __future__ import annotations
-
 import math
 from typing import NamedTuple
 

@@ -1,7 +1,5 @@
 """GCI of marginalised GLMBs, label set by label set, or of products of them, group by group of their labels."""
 
-from __future__ import annotations
-
 import math
 from typing import NamedTuple
 

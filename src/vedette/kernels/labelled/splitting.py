@@ -8,8 +8,6 @@ marginals of some parts of the labels has the weights pi = prod over parts of w_
 as the choices that are not hypotheses have w = 0, and all pi sum to 1. That bounds the L1 distance of the densities.
 """
 
-from __future__ import annotations
-
 import math
 from typing import NamedTuple
 

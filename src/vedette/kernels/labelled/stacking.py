@@ -1,7 +1,5 @@
 """Concatenation of bundles, so that one kernel call processes them all, and extraction of tracks."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Choices of one cost from each of several lists in order of their sum, by best-first search."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

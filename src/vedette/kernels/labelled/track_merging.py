@@ -4,8 +4,6 @@ Hypotheses that explain a scan differently give a label different tracks. With m
 their different origin becomes irrelevant. Without merging they would multiply from scan to scan.
 """
 
-from __future__ import annotations
-
 import math
 from typing import NamedTuple
 

@@ -4,8 +4,6 @@ A density that passes here also passes `validate`, since the tolerances are narr
 `vedette.densities.checks`. One that fails must be given to `validate`, which reports the fault or accepts it.
 """
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Coordinate ascent on rewards that are sums over labels. A line costs only what its sensor can reach."""
 
-from __future__ import annotations
-
 import math
 from typing import NamedTuple
 

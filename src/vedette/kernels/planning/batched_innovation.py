@@ -5,8 +5,6 @@ definite, a difference that cancels), and for sigma points, a Gaussian is proces
 is final.
 """
 
-from __future__ import annotations
-
 import math
 
 from vedette.kernels.base.compile import borrowing, inlined

@@ -4,8 +4,6 @@ A model is a function of one state. For the built-in models most used in decisio
 here over an index of states. `ModelForms` selects them for a decision (docs/decisions/0033). Arrays are as in `lanes`.
 """
 
-from __future__ import annotations
-
 import math
 from typing import NamedTuple
 

@@ -4,8 +4,6 @@ The formulas are those of `vedette.kernels.gaussian.prediction`. If a number is 
 one by one by that kernel, whose result or error is final.
 """
 
-from __future__ import annotations
-
 import math
 from typing import NamedTuple
 

@@ -11,8 +11,6 @@ weights and adds them, and the existence of a sum is its logit plus the log inte
 Bernoulli family is exponential. A *change* is the row after scans minus the row without scans.
 """
 
-from __future__ import annotations
-
 import math
 from typing import NamedTuple
 

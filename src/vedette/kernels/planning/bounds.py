@@ -12,8 +12,6 @@ sensor on its own best course. Undetected targets, 1 - exp(sum), are treated ali
 from the mean of all courses towards these courses improve the tangent (sensor selection: Joshi and Boyd 2009).
 """
 
-from __future__ import annotations
-
 import math
 from typing import NamedTuple
 

@@ -4,8 +4,6 @@ They are kept from case to case: a decision is about five thousand filter steps 
 allocated its own arrays would spend more time on them than on the filter.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The cells of a grid that a sensor sees on each of its courses."""
 
-from __future__ import annotations
-
 import math
 from typing import NamedTuple
 

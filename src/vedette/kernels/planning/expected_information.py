@@ -5,8 +5,6 @@ measurement, and the label is missed by all scans with the product of the 1 - P_
 Gaussian. As a change of a Bernoulli row, only the information matrix and log (1 - q) are set.
 """
 
-from __future__ import annotations
-
 import math
 from typing import NamedTuple
 

@@ -1,7 +1,5 @@
 """Predicted ideal measurements: the scan of a sampled multi-target state by a sensor (Mahler 2004)."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

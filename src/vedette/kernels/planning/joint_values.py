@@ -3,8 +3,6 @@
 A label that no chosen course reaches keeps its value without scans, which is computed once.
 """
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

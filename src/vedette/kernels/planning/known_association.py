@@ -9,8 +9,6 @@ and a scan in which the sampled target is not detected, or absent, odds o (1 - P
 followed with all samples side by side.
 """
 
-from __future__ import annotations
-
 import math
 from typing import NamedTuple
 

@@ -1,7 +1,5 @@
 """Results of pseudo-updates with known association: changes of Bernoulli rows, or densities, for every course."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

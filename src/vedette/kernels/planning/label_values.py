@@ -8,8 +8,6 @@ is the label's part of Z(a, b) (q unnormalised by (1 - r_q)^b, the same for ever
 loss of `vedette.control.ExpectedLossReward`. And a model function of the two Bernoullis.
 """
 
-from __future__ import annotations
-
 import math
 from typing import Any, NamedTuple
 

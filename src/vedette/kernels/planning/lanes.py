@@ -4,8 +4,6 @@ Symmetric matrices are lower triangles, row by row. Each loop writes one array, 
 loops over many arrays that might overlap.
 """
 
-from __future__ import annotations
-
 from vedette.kernels.base.compile import inlined
 from vedette.kernels.base.types import Floats
 

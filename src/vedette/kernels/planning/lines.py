@@ -1,7 +1,5 @@
 """Straight lines in the plane and their intersections with edges of zones."""
 
-from __future__ import annotations
-
 import math
 from typing import NamedTuple
 

@@ -6,8 +6,6 @@ that every joint association is a separate hypothesis. The samples of an action 
 case keeps all label sets of the prior, so that all cases and the prediction have the same support.
 """
 
-from __future__ import annotations
-
 import math
 from typing import NamedTuple
 

@@ -5,8 +5,6 @@ A case is one action of one sensor with one sample: case `action * num_samples +
 dropped, and the samples of an action share the first prediction.
 """
 
-from __future__ import annotations
-
 import math
 from typing import NamedTuple
 

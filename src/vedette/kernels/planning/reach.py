@@ -1,7 +1,5 @@
 """Labels predicted over the horizon without scans, and the labels that a course may detect."""
 
-from __future__ import annotations
-
 import math
 from typing import NamedTuple
 

@@ -1,7 +1,5 @@
 """Posterior from the kept joint choices of a scan: updated tracks, each stored once, and hypotheses over them."""
 
-from __future__ import annotations
-
 import math
 from typing import NamedTuple
 

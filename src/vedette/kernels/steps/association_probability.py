@@ -1,7 +1,5 @@
 """Probability that existing tracks explain each measurement, so that births can use the others."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -3,8 +3,6 @@
 Bernoullis are stored as an LMB with meaningless labels. They are the rows of a scan as those of an LMB are.
 """
 
-from __future__ import annotations
-
 import math
 from typing import NamedTuple
 

@@ -5,8 +5,6 @@ cardinality distribution, or one whose coefficients are the elementary symmetric
 ratios. Sums of such terms neither cancel nor, as logs, overflow.
 """
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

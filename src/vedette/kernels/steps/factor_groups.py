@@ -1,7 +1,5 @@
 """Groups of linked factors of a belief as small GLMBs: rows, options and prior hypotheses."""
 
-from __future__ import annotations
-
 import math
 from typing import NamedTuple
 

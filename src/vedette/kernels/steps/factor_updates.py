@@ -1,7 +1,5 @@
 """Update of the factors of one group at a scan, and its split into independent parts."""
 
-from __future__ import annotations
-
 import math
 from typing import NamedTuple
 

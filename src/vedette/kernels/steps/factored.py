@@ -6,8 +6,6 @@ Then each group splits into the smallest parts that are independent within a giv
 (`vedette.kernels.labelled.splitting`), and a part of one label becomes one track again, the mixture of its versions.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

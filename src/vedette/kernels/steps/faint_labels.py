@@ -6,8 +6,6 @@ the densities of its measurement and of those of undetected targets. Where r g i
 later odds, however small both are.
 """
 
-from __future__ import annotations
-
 import math
 from typing import NamedTuple
 

@@ -4,8 +4,6 @@ A track outside the field of view, which is certain to be missed, stays unchange
 and p_D g(z | x) / kappa(z) is negligible next to 1 for every measurement.
 """
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -11,8 +11,6 @@ relative to the weight of all measurements being clutter. A planner runs the sam
 (`vedette.kernels.planning.pseudo_glmb`). A filter adds births, and the choice of the children to keep.
 """
 
-from __future__ import annotations
-
 import math
 from typing import NamedTuple
 

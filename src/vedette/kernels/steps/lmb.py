@@ -8,8 +8,6 @@ are sums over the options of a row weighted by their marginal probabilities, so 
 A planner runs the same kernels in its own workspace (`vedette.kernels.planning.pseudo_lmb`).
 """
 
-from __future__ import annotations
-
 import math
 from typing import NamedTuple
 

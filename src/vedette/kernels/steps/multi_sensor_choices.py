@@ -1,7 +1,5 @@
 """Tracks that compete for measurements of several sensors: their clusters, and their choices as bit sets."""
 
-from __future__ import annotations
-
 import math
 from typing import NamedTuple
 

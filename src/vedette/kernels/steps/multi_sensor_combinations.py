@@ -5,8 +5,6 @@ updates the components. With linear Gaussian models the order of the sensors doe
 those of all measurements together.
 """
 
-from __future__ import annotations
-
 import math
 from typing import NamedTuple
 

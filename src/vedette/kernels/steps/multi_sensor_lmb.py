@@ -1,7 +1,5 @@
 """LMB of the exact posterior's existences and densities, from the combinations of all tracks at all sensors."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

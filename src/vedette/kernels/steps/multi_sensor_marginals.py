@@ -6,8 +6,6 @@ later ones may still take. Only sets that occur are stored, and the tracks are o
 a time. Everything is in logs, so that nothing underflows.
 """
 
-from __future__ import annotations
-
 import math
 from typing import NamedTuple
 

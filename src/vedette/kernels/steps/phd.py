@@ -4,8 +4,6 @@ An intensity is predicted and updated as the single row of a scan: its component
 birth sites. Its options are a miss or a detection as one of the gated measurements, and never absence.
 """
 
-from __future__ import annotations
-
 import math
 from typing import NamedTuple
 

@@ -3,8 +3,6 @@
 They are a Poisson intensity of Gaussians, and tables of expected numbers in the cells of a grid.
 """
 
-from __future__ import annotations
-
 import math
 from typing import NamedTuple
 

@@ -1,7 +1,5 @@
 """Builders of runs: an experiment to be simulated, or a recording to be tracked."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from vedette.errors import InputError

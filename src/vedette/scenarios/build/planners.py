@@ -1,7 +1,5 @@
 """The planners of a scenario."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from functools import partial
 

@@ -1,7 +1,5 @@
 """The sensors of a scenario: their filters and platforms, where they start and when they scan."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import replace

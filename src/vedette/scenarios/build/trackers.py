@@ -1,7 +1,5 @@
 """The tracker of a scenario: the filters of its sensors, their fusion, and the network between them."""
 
-from __future__ import annotations
-
 from functools import partial
 from typing import Any
 

@@ -3,8 +3,6 @@
 Each field's description ends with its unit in brackets; [-] is a number without a unit.
 """
 
-from __future__ import annotations
-
 import re
 from collections.abc import Callable, Iterator, Mapping
 from functools import cache
@@ -139,7 +137,7 @@ def readable_findings(findings: Callable[..., Iterator[Finding]], *arguments: An
         return
 
 
-def sections_in(value: Any) -> list[tuple[Path, Section]]:
+def sections_in(value: Any) -> "list[tuple[Path, Section]]":
     """Return a section and all sections in it, each with its path, from the outside in, in the order of the fields."""
     sections: list[tuple[Path, Section]] = []
     pending: list[tuple[Path, Any]] = [((), value)]

@@ -1,7 +1,5 @@
 """Custom objects that a scenario names: import, construction, and checks against their protocol."""
 
-from __future__ import annotations
-
 import hashlib
 import importlib
 import importlib.util
@@ -39,7 +37,7 @@ class MissingMember(InputError):
         wanted, got: expected and given value.
     """
 
-    def __init__(self, section: Custom, key: str, wanted: str, got: str) -> None:
+    def __init__(self, section: "Custom", key: str, wanted: str, got: str) -> None:
         super().__init__(f"{section.field}.{key}: expected {wanted}; got {got}")
         self.section, self.key, self.wanted, self.got = section, key, wanted, got
 

@@ -1,7 +1,5 @@
 """Sections about decisions: rewards, constraints, searches, and lookahead."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal

@@ -1,7 +1,5 @@
 """Fields of view with an edge, for drawings and for checks, which compile nothing."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from typing import NamedTuple

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
@@ -14,6 +13,7 @@ from vedette.internal.quantities import COMPONENTS, ONLY_MEASURED, PLACED, in_fi
 from vedette.internal.unit_warnings import suppress_unit_warnings
 from vedette.scenarios.diagnostics import Finding, describe
 from vedette.scenarios.sections.base import Section
+from vedette.scenarios.sections.derived import Part, derived
 from vedette.scenarios.sections.sensing import (
     Clutter,
     Detection,
@@ -25,7 +25,7 @@ from vedette.scenarios.sections.sensing import (
 )
 
 if TYPE_CHECKING:  # importing the models imports the compiler, which a check does not need
-    from vedette.models import Bias, Region, SensorModel
+    from vedette.models import Region, SensorModel
     from vedette.simulation import TrueSensor as TrueSensorModel
 
 
@@ -50,21 +50,9 @@ def build_parts(
     return {"measurement": model, **parts}
 
 
-class BiasSection(Section):
+@derived("vedette.models.bias:Bias")
+class BiasSection(Part):
     """What the scans of a sensor say too much."""
-
-    range: float = Field(default=0.0, description="Of ranges [m].")
-    bearing_deg: float = Field(
-        default=0.0,
-        description="Of bearings, clockwise of a sensor with a compass and where recorded or live scans count them "
-        "from the north, else counter-clockwise [deg].",
-    )
-    clock: float = Field(default=0.0, description="Of times: how far its clock is ahead [s].")
-    x: float = Field(default=0.0, description="Of where it is said to be, or of positions that it measures, east [m].")
-    y: float = Field(default=0.0, description="The same, north [m].")
-    range_rate: float = Field(default=0.0, description="Of range rates [m/s].")
-    elevation_deg: float = Field(default=0.0, description="Of elevations [deg].")
-    altitude: float = Field(default=0.0, description="Of altitudes [m].")
 
     def findings_beside(self, measurement: Measurement) -> Iterator[Finding]:
         """Yield faults of the bias for a sensor with this measurement."""
@@ -73,14 +61,6 @@ class BiasSection(Section):
             if value := getattr(self, name := in_file(component)):
                 words = component.replace("_", " ")
                 yield (name,), f"0, as no {words} is measured ({measurement.kind})", describe(value)
-
-    def build(self) -> Bias:
-        """Return the bias in SI units."""
-        from vedette.models import Bias
-
-        angles = math.radians(self.bearing_deg), math.radians(self.elevation_deg)
-        plane = self.range, angles[0], self.clock, self.x, self.y
-        return Bias(*plane, self.range_rate, angles[1], self.altitude)
 
 
 class TrueSensor(Section):
