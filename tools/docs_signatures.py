@@ -110,7 +110,8 @@ def members(protocol: type) -> list[str]:
 def _method(name: str, function: FunctionType) -> str:
     """Return `def name(...) -> ...: ...`, with one argument per line if it is long."""
     given, node = inspect.signature(function), _definition(function)
-    stated = {own.arg: ast.unparse(own.annotation) for own in ast.walk(node.args) if getattr(own, "annotation", None)}
+    stated_in = [own for own in ast.walk(node.args) if isinstance(own, ast.arg)]
+    stated = {own.arg: ast.unparse(own.annotation) for own in stated_in if own.annotation}
     parameters = [own.replace(annotation=stated.get(own.name, own.annotation)) for own in given.parameters.values()]
     line = f"def {name}{given.replace(parameters=parameters, return_annotation=ast.unparse(node.returns))}: ..."
     line = line.replace("'", "")

@@ -273,7 +273,7 @@ def test_at_the_edge_of_view_a_miss_counts_the_factor_of_the_mode():
     belief = after_two_scans(seen_and_dim(0.6, at_birth=(0.5, 0.5)), disc_sensor(100.0), np.empty((0, 2)))
     points = np.random.default_rng(1).normal(size=(400_000, 2)) * 10.0 + [100.0, 0.0]
     visible = 0.95 * (np.hypot(*points.T) <= 100.0)
-    order = np.argsort(belief.tracks.marks.modes[:, 0])
+    order = np.argsort(belief.tracks.modes)
     totals = []
     for c, factor in zip(order, (1.0, 0.6), strict=True):
         weights = 1.0 - factor * visible
