@@ -162,4 +162,4 @@ def test_a_run_of_an_ordinary_scene_has_no_finding() -> None:
     results = record_diagnostics(run_scenario(ordinary, "stationary", seed=0), ordinary)
     assert {each.name for each in results} >= {"New targets", "Births dropped", "Targets reported"}
     assert "check" not in levels(results)
-    assert len(results) == len(record_diagnostics(run_scenario(ordinary, "stationary", seed=0), None)) + 4
+    assert len(results) == len(record_diagnostics(run_scenario(ordinary, "stationary", seed=0), None)) + 3

@@ -14,14 +14,13 @@ if TYPE_CHECKING:
 
 
 def run_document(record: RunRecord, scenario: Scenario | None, fit: Fit | None = None) -> dict[str, Any]:
-    """Return the document of a run: scans, decisions, mean OSPA over the scans that count, targets, times, diagnostics.
+    """Return the document of a run: scans, decisions, mean OSPA over the scans that count, run times, diagnostics.
 
     Without the scenario, OSPA has no unit and sensors have numbers. fit: of the model to recorded scans.
     """
     from vedette.evaluation.comparison import counted_scans, decided_actions
     from vedette.evaluation.diagnostics import record_diagnostics
     from vedette.evaluation.ensembles import PARTS
-    from vedette.evaluation.runs import named_target_scores
 
     decisions = [
         {
@@ -48,9 +47,6 @@ def run_document(record: RunRecord, scenario: Scenario | None, fit: Fit | None =
         "stopped": record.stopped,
         "decisions": decisions,
         "ospa": {"unit": unit, "from_s": window[0], "to_s": window[-1], **means},
-        "targets": []
-        if scenario is None
-        else [{"name": name, **score._asdict()} for name, score in named_target_scores(record, scenario)],
         "seconds": {stage: seconds.sum() for stage, seconds in record.timings.items()},
         "diagnostics": [
             {"name": each.name, "level": each.level, "text": each.text} for each in record_diagnostics(record, scenario)

@@ -96,6 +96,7 @@ def track(
     figures.
     """
     from vedette.cli.calibrating import calibrate_doubtful
+    from vedette.evaluation.runs import named_target_scores
     from vedette.scenarios.from_recording import scenario_from_recording
 
     identity = _check_output(formats or (), out, overwrite)
@@ -127,7 +128,8 @@ def track(
     if folder is not None:
         echo(f"Wrote {folder}: {', '.join(_contents(folder, written))}")
     origin = {"assumptions": recorded.assumed, "skipped": recorded.recording.skipped, "warnings": warnings}
-    more = {"joins": [join._asdict() for join in joins], "calibration": calibration}
+    targets = [{"name": name, **own._asdict()} for name, own in named_target_scores(record, scenario)]
+    more = {"targets": targets, "joins": [join._asdict() for join in joins], "calibration": calibration}
     emit_json({**run_document(record, scenario, fit), **origin, **more, "folder": folder, "written": written})
 
 

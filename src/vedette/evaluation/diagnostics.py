@@ -54,7 +54,9 @@ def record_diagnostics(record: RunRecord, scenario: Scenario | None) -> tuple[Di
 
 
 def _error_diagnostics(record: RunRecord, scenario: Scenario) -> Iterator[Diagnostic]:
-    """Yield the diagnostic of errors of one run, none if no target is known."""
+    """Yield the diagnostic of errors of a recording with known targets. Of simulated runs, NEES is a metric."""
+    if record.recording is None:
+        return
     ospa = scenario.model.ospa
     matching = match_run(record.truth, record.estimates, cutoff=ospa.cutoff, order=ospa.order)
     if (num := len(matching.scans)) < _FEW_ERRORS:
