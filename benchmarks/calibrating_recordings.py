@@ -11,18 +11,15 @@ of the measurement nearest to a vessel, within 20 m, as a standard deviation.
 from __future__ import annotations
 
 import argparse
-import csv
-import json
 import math
 import tempfile
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any, NamedTuple
 
 import numpy as np
+from ferry import Scan, positions, read, score, write_rows
 from numpy.typing import NDArray
 from pages import write_between
-from scipy.optimize import linear_sum_assignment
 
 from vedette.calibration import Calibration, calibrate
 from vedette.evaluation.runs import track_recording
@@ -31,7 +28,7 @@ from vedette.scenarios.from_recording import scenario_from_recording
 
 Floats = NDArray[np.float64]
 MINUS = "\N{MINUS SIGN}"
-RADAR, NEAR, CUTOFF, BLOCKS = 2, 50.0, 20.0, 10
+CUTOFF, BLOCKS = 20.0, 10
 SENSORS = """recording: {bearings: north}
 sensors:
   - name: radar
@@ -42,82 +39,41 @@ sensors:
 """
 
 
-class Scan(NamedTuple):
-    """A radar scan: time, s; position of the ferry, east and north, m; (n, 2) offsets of the measurements, likewise."""
-
-    time: float
-    own: Floats
-    offsets: Floats
-
-
-def read(dataset: Path, number: int) -> tuple[list[Scan], dict[int, Floats]]:
-    """Return the radar scans of a scenario, and the (n, 3) times and positions of each vessel."""
-    base = dataset / f"scenario{number}" / f"scenario{number}"
-    rows = json.loads(Path(f"{base}_detections.json").read_text("utf-8"))
-    start, scans = min(row["time"] for row in rows), list[Scan]()
-    for row in sorted(rows, key=lambda row: row["time"]):
-        if row["sensorID"] == RADAR:
-            measured = np.array(row["measurement"] or np.empty((2, 0)), np.float64).reshape(2, -1)  # north, east
-            own = np.array(row["ownshipPosition"][1::-1])
-            scans.append(Scan(row["time"] - start, own, measured[::-1].T))
-    vessels: dict[int, list[list[float]]] = {}
-    for entry in json.loads(Path(f"{base}_groundTruth.json").read_text("utf-8")):
-        for row in entry if isinstance(entry, list) else [entry]:
-            vessels.setdefault(row["targetID"], []).append([row["time"] - start, *row["position"][1::-1]])
-    return scans, {name: np.unique(np.array(rows), axis=0) for name, rows in vessels.items()}
-
-
-def positions(vessels: dict[int, Floats], time: float) -> Floats:
-    """(n, 2) positions of the vessels that are recorded at a time."""
-    there = [each for each in vessels.values() if each[0, 0] - 1.0 <= time <= each[-1, 0] + 1.0]
-    return np.array([[np.interp(time, each[:, 0], each[:, i]) for i in (1, 2)] for each in there]).reshape(-1, 2)
-
-
-def gospa(found: Floats, true: Floats) -> float:
-    """GOSPA of order 2 of the estimates near a target."""
-    gaps = np.hypot(*(found[:, None] - true[None]).transpose(2, 0, 1))
-    gaps = gaps[gaps.min(axis=1, initial=math.inf) < NEAR]
-    matched = gaps[linear_sum_assignment(np.minimum(gaps, CUTOFF) ** 2)]
-    matched = matched[matched < CUTOFF]
-    unmatched = len(gaps) + len(true) - 2 * len(matched)
-    return math.sqrt((matched**2).sum() + 0.5 * CUTOFF**2 * unmatched)
-
-
 def scores(scans: list[Scan], vessels: dict[int, Floats], file: Path, rows: Path) -> Floats:
     """(num_scans,) GOSPA at the scans, tracked with a sensors file."""
     recorded = scenario_from_recording(file, rows)
     record = track_recording(recorded.scenario, recorded.recording)
-    means = [estimate.means[:, :2] for estimate in record.estimates]
-    return np.array([gospa(own, positions(vessels, scan.time)) for own, scan in zip(means, scans, strict=True)])
+    return score(list(record.estimates), np.array([scan.time for scan in scans]), vessels).gospa[:, 0]
 
 
 def true_errors(scans: list[Scan], vessels: dict[int, Floats]) -> dict[str, float]:
     """Return the standard deviations of the errors of range, m, and bearing, degrees."""
     rows = []
     for scan in scans:
-        for x, y in positions(vessels, scan.time) - scan.own:
-            gaps = np.hypot(*(scan.offsets - [x, y]).T)
+        for x, y in (place - scan.own for place in positions(vessels, scan.time).values()):
+            gaps = np.hypot(*(scan.measured - [x, y]).T)
             if gaps.min(initial=math.inf) < CUTOFF:
-                near_x, near_y = scan.offsets[gaps.argmin()]
+                near_x, near_y = scan.measured[gaps.argmin()]
                 turn = math.remainder(math.atan2(near_x, near_y) - math.atan2(x, y), 2.0 * math.pi)
                 rows.append((math.hypot(near_x, near_y) - math.hypot(x, y), math.degrees(turn)))
     return dict(zip(("range", "bearing"), np.std(rows, axis=0).tolist(), strict=True))
 
 
+def radar_scans(dataset: Path, number: int) -> tuple[list[Scan], dict[int, Floats]]:
+    """Return the radar scans of a scenario, and the times and positions of each vessel."""
+    scans, vessels = read(dataset, number)
+    return [scan for scan in scans if scan.sensor == "radar"], vessels
+
+
 def write_files(scans: list[Scan], rows: Path, sensors: Path) -> None:
     """Write the scans as rows, and the sensors file."""
-    with rows.open("w", newline="") as opened:
-        table = csv.writer(opened)
-        table.writerow(["time", "sensor", "range_m", "bearing_rad", "own_x", "own_y"])
-        for scan in scans:
-            polar: list[tuple[Any, Any]] = [(math.hypot(x, y), math.atan2(x, y)) for x, y in scan.offsets]
-            table.writerows([scan.time, "radar", *each, *scan.own] for each in polar or [("", "")])
+    write_rows(scans, rows)
     sensors.write_text(SENSORS, "utf-8")
 
 
 def row(dataset: Path, number: int, folder: Path) -> tuple[str, list[bool]]:
     """Return the row of a scenario, and for each noise with an interval whether the true error is inside."""
-    scans, vessels = read(dataset, number)
+    scans, vessels = radar_scans(dataset, number)
     rows, file, written = folder / "scans.csv", folder / "radar.yaml", folder / "calibrated.yaml"
     write_files(scans, rows, file)
     recorded = scenario_from_recording(file, rows)

@@ -25,7 +25,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import yaml
-from calibrating_recordings import read, write_files
+from calibrating_recordings import radar_scans, write_files
 from scenes import decades
 
 from vedette.evaluation.fit import Fit, fit_of_run
@@ -191,7 +191,7 @@ def show_ferry(dataset: Path) -> None:
     for number in (2, 4, 5, 13, 17):
         with tempfile.TemporaryDirectory() as folder:
             scans, sensors = Path(folder, "scans.csv"), Path(folder, "radar.yaml")
-            write_files(read(dataset, number)[0], scans, sensors)
+            write_files(radar_scans(dataset, number)[0], scans, sensors)
             recorded = scenario_from_recording(sensors, scans)
             fit = fit_of_run(track_recording(recorded.scenario, recorded.recording), recorded.scenario)
         print(f"{number}:", *(each.text for each in fit.findings), sep="\n  ", flush=True)

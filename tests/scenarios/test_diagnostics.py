@@ -105,9 +105,9 @@ std: [0.02, 3.0] -> std: [0.02]
 std: [0.02, 3.0] -> std: [0.02, -3.0]
     15:39: sensor_defaults.noise.std[1]: expected a number above 0, got -3.0
 kind: constant, std: [0.02, 3.0] -> kind: range_dependent, sigma_bearing: 1
-    15:34: sensor_defaults.noise.sigma_bearing: expected one of eta_bearing, eta_range, kind, sigma_altitude, sigma_bearing_deg, sigma_elevation_deg, sigma_range, sigma_range_rate, got an unknown key (did you mean sigma_bearing_deg?)
+    15:34: sensor_defaults.noise.sigma_bearing: expected one of eta_bearing, eta_range, extent, kind, sigma_altitude, sigma_bearing_deg, sigma_elevation_deg, sigma_range, sigma_range_rate, got an unknown key (did you mean sigma_bearing_deg?)
 sensor_defaults:\n  noise: { -> sensor_defaults:\n  nose: {
-    15:3: sensor_defaults.nose: expected one of bias, budget, classification, clutter, compass, detection, extent, heading_deg, height, measurement, noise, platform, price, scans, signal, stationary_until_first_decision, switchable, true_parameters, turn, got an unknown key (did you mean noise?)
+    15:3: sensor_defaults.nose: expected one of bias, budget, classification, clutter, compass, correlation, detection, extent, heading_deg, height, measurement, noise, platform, price, scans, signal, stationary_until_first_decision, switchable, true_parameters, turn, got an unknown key (did you mean noise?)
 position: [0.0, 40.0] -> position: [0.0, 40.0, 1.0]
     17:29: sensors[0].position: expected a list of 2, got a list of 3
 heading_deg: 4.0 -> platform: {kind: waypoints, speed: 1.0, points: [[0.0, 1.0], [2.0]]}
@@ -125,7 +125,7 @@ heading_deg: 4.0 -> platform: {kind: heading}
 heading_deg: 4.0 -> platform: {kind: hedding, speed: 4.0}
     17:59: sensors[0].platform.kind: expected one of camera, grid_moves, heading, stationary, waypoints, custom, got "hedding" (did you mean heading?)
 heading_deg: 4.0 -> speed: 4.0
-    17:42: sensors[0].speed: expected one of bias, budget, classification, clutter, compass, detection, extent, heading_deg, height, measurement, name, noise, platform, position, price, scans, signal, stationary_until_first_decision, switchable, true_parameters, turn, got an unknown key (the platform of a sensor has it: `platform: {kind: heading, speed: 50.0, headings_deg: [0, 90]}`)
+    17:42: sensors[0].speed: expected one of bias, budget, classification, clutter, compass, correlation, detection, extent, heading_deg, height, measurement, name, noise, platform, position, price, scans, signal, stationary_until_first_decision, switchable, true_parameters, turn, got an unknown key (the platform of a sensor has it: `platform: {kind: heading, speed: 50.0, headings_deg: [0, 90]}`)
 heading_deg: 4.0 -> platform: {kind: camera, half_width_deg: 200.0, pointings_deg: [0.0], platform: {kind: camera}}
     17:83: sensors[0].platform.half_width_deg: expected a number of at most 180, got 200.0
     17:129: sensors[0].platform.platform.kind: expected one of stationary, heading, grid_moves, waypoints, custom, got "camera"
@@ -433,7 +433,7 @@ cutoff: 50.0 -> cutoff: wide
     2:1: name: expected each key once, got it again, after line 1
     24:16: ospa.cutoff: expected a number, got "wide"
 heading_deg: 4.0 -> <<: {heading_deg: 4.0}
-    17:42: sensors[0].<<: expected one of bias, budget, classification, clutter, compass, detection, extent, heading_deg, height, measurement, name, noise, platform, position, price, scans, signal, stationary_until_first_decision, switchable, true_parameters, turn, got an unknown key (YAML 1.2 has no merge keys; sensor_defaults holds what sensors share)
+    17:42: sensors[0].<<: expected one of bias, budget, classification, clutter, compass, correlation, detection, extent, heading_deg, height, measurement, name, noise, platform, position, price, scans, signal, stationary_until_first_decision, switchable, true_parameters, turn, got an unknown key (YAML 1.2 has no merge keys; sensor_defaults holds what sensors share)
 kind: constant_velocity, sigma_v: 1.0 -> kind: coordinated_turn
 mean: [0.0, 0.0, 0.0, 0.0], std: [5.0, 5.0, 2.0, 2.0] -> mean: [0.0, 0, 0, 0, 0], std: [5.0, 5, 2, 2, 1]
 targets:\n  kind: scripted\n  tracks:\n    - {state: [1.0, 2.0, 0.5, -0.5], start_step: 2, end_step: 18}

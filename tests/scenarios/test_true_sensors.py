@@ -6,11 +6,13 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pytest
 from typer.testing import CliRunner
 
 from scenarios.minimal import changed
 from vedette import models
 from vedette.cli import app
+from vedette.errors import ScenarioError
 from vedette.models import DetectionModel
 from vedette.scenarios import Scenario, parse_scenario
 from vedette.scenarios.build import build_experiment
@@ -56,7 +58,9 @@ def test_simulated_and_assumed_sensors_differ() -> None:
     assert true.first_detection is not None
     np.testing.assert_array_equal(np.flatnonzero(experiment.scans_at[0]) + 1, [2, 5, 8, 11, 14, 17, 20])
     assert experiment.scans_at[1].all()
-    assert experiment.true_sensors[1].model is experiment.tracker.sensors[1]
+    for name in ("measurement", "noise", "detection", "clutter"):
+        parts = [getattr(each, name) for each in (experiment.true_sensors[1].model, experiment.tracker.sensors[1])]
+        np.testing.assert_array_equal(parts[0].params, parts[1].params)
 
 
 def test_a_published_detection_model_can_be_given_exactly() -> None:
@@ -113,3 +117,30 @@ def test_check_and_show(tmp_path: Path) -> None:
     for words in ("north: true detection", "north: true first detection", "north: scans", "every 3 steps from step 2"):
         assert words in shown.output
     assert "south: scans" not in shown.output
+
+
+LASTS = """detection: {kind: constant, probability: 0.9}
+    correlation: {noise_s: 4.0, visible_s: 6.0, hidden_s: 2.0}
+    scans: {every: 3}"""
+
+
+def test_filters_count_errors_that_last_for_less_and_keep_who_is_hidden():
+    section = f"  - name: north\n    position: [0.0, 40.0]\n    {LASTS}"
+    text = changed(("  - {name: north, position: [0.0, 40.0], heading_deg: 4.0}", section))
+    experiment = experiment_of(text)
+    known, true = experiment.tracker.sensors[0], experiment.true_sensors[0]
+    interval = 3.0 * Scenario(parse_scenario(text)).model.time.step_period
+    wider = np.sqrt((1.0 + np.exp(-interval / 4.0)) / (1.0 - np.exp(-interval / 4.0)))
+    np.testing.assert_allclose(known.noise.least_stds, wider * true.model.noise.least_stds)
+    assert known.detection.params.tolist() == [0.9]
+    assert known.mode_factors.tolist() == [1.0, 0.0]
+    assert experiment.tracker.targets.motion.names == ("visible", "hidden from north")
+    assert (true.noise_s, true.stays_s) == (4.0, (6.0, 2.0))
+    assert experiment.tracker.sensors[1].mode_factors is None
+    assert experiment.tracker.sensors[1].noise.params.tolist() == experiment.true_sensors[1].model.noise.params.tolist()
+
+
+def test_of_the_two_stays_both_or_none_are_given():
+    section = "  - name: north\n    position: [0.0, 40.0]\n    correlation: {visible_s: 6.0}"
+    with pytest.raises(ScenarioError, match=r"correlation\.hidden_s: expected a time in s"):
+        parse_scenario(changed(("  - {name: north, position: [0.0, 40.0], heading_deg: 4.0}", section)))

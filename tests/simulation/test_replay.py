@@ -14,8 +14,11 @@ from vedette.scenarios.build import build_experiment
 from vedette.simulation import CLUTTER, Scan, load_run, loop, save_run, simulate_scans
 from vedette.simulation.replay import scans_of
 
+LASTING = "sensor_defaults:\n  true_parameters: {correlation: {noise_s: 5.0, visible_s: 6.0, hidden_s: 3.0}}\n"
 
-def test_the_scans_drawn_again_are_those_that_the_loop_simulated(monkeypatch: pytest.MonkeyPatch) -> None:
+
+@pytest.mark.parametrize("lasting", ["sensor_defaults:\n", LASTING])
+def test_the_scans_drawn_again_are_those_that_the_loop_simulated(monkeypatch: pytest.MonkeyPatch, lasting: str) -> None:
     simulated: list[Scan] = []
 
     def recording(*args: Any, **kwargs: Any) -> tuple[Scan, ...]:
@@ -24,7 +27,8 @@ def test_the_scans_drawn_again_are_those_that_the_loop_simulated(monkeypatch: py
         return scans
 
     monkeypatch.setattr(loop, "simulate_scans", recording)
-    scenario = load_scenario("paper-a")
+    text = list_builtin()["paper-a"].read_text("utf-8")
+    scenario = Scenario(parse_scenario(text.replace("sensor_defaults:\n", lasting)))
     record = run_scenario(scenario, "random", seed=3, run=2)
     again: Any = scans_of(record, build_experiment(scenario))
     assert len(again) == record.num_scans

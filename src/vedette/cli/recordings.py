@@ -16,12 +16,21 @@ _SHOWN_ROWS = 5
 
 
 def read_recording(
-    sensors: Path, scans: Path, truth: Path | None, *, speed: float, bad_rows: str, trust: bool
+    sensors: Path,
+    scans: Path,
+    truth: Path | None,
+    *,
+    speed: float,
+    bad_rows: str,
+    trust: bool,
+    partial_truth: bool = False,
 ) -> tuple[RecordingScenario, list[str]]:
     """Return the scenario of recorded scans and its warnings. Print skipped rows, assumptions and code that runs."""
     from vedette.scenarios.from_recording import scenario_from_recording
 
-    recorded = scenario_from_recording(sensors, scans, truth, speed=speed, bad_rows=bad_rows)
+    recorded = scenario_from_recording(
+        sensors, scans, truth, speed=speed, bad_rows=bad_rows, partial_truth=partial_truth
+    )
     CodeTrust(trust)(recorded.scenario)
     warnings = print_warnings(recorded.scenario)
     for text in recorded.recording.skipped[:_SHOWN_ROWS]:

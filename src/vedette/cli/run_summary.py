@@ -20,6 +20,7 @@ if TYPE_CHECKING:
 _NEAR_CUTOFF = 0.8  # share of the cutoff of OSPA above which the estimates are hardly of the targets
 _SHOWN_SECONDS = 0.005  # shortest time of a stage that is shown
 _FEW_DECISIONS = 5  # printed without --verbose
+_FEW_TARGETS = 10  # of a recording, printed without --verbose
 _LONGEST_ACTIONS = 36  # letters; longer actions are printed only with --verbose
 
 
@@ -34,6 +35,8 @@ def print_run(record: RunRecord, scenario: Scenario | None, fit: Fit | None = No
     if record.decisions:
         _print_decisions(console, record)
     _print_facts(console, record, scenario)
+    if scenario is not None and (is_verbose() or record.recording is not None):
+        _print_targets(console, record, scenario)
     _print_diagnostics(console, record, scenario)
     if fit is not None:
         first, *others = fit.lines(num_warnings)
@@ -100,6 +103,27 @@ def _print_facts(console: Console, record: RunRecord, scenario: Scenario | None)
     console.print(
         f"run time    {sum(seconds_by_stage.values()):.2f} s{f' ({stages})' if stages else ''}", soft_wrap=True
     )
+
+
+def _print_targets(console: Console, record: RunRecord, scenario: Scenario) -> None:
+    """Print how well each target was tracked."""
+    from rich.table import Table
+
+    from vedette.evaluation.health import percent
+    from vedette.evaluation.runs import named_target_scores
+
+    scores = named_target_scores(record, scenario)
+    if not scores:
+        return
+    table = Table(box=None, pad_edge=False)
+    for heading in ("target", "scans", "with an estimate", "error", "error over its bar", "changes of label"):
+        table.add_column(heading, justify="left" if heading == "target" else "right")
+    for name, own in scores if is_verbose() else scores[:_FEW_TARGETS]:
+        error, ratio = ("-" if math.isnan(x) else f"{x:.2f}" for x in (own.rmse_m, own.error_ratio))
+        table.add_row(name, str(own.num_scans), percent(own.covered), f"{error} m", ratio, str(own.label_switches))
+    console.print(table)
+    if (num := len(scores) - _FEW_TARGETS) > 0 and not is_verbose():
+        console.print(f"{pluralise(num, 'more target')}: --verbose prints all", style="dim")
 
 
 def _far_words(record: RunRecord, scenario: Scenario, counts: Bools, total: float) -> str:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from enum import StrEnum
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -44,6 +44,13 @@ TruthFile = Annotated[
     Path | None,
     typer.Option("--truth", metavar="FILE", help="Reports of the targets themselves, to compute errors."),
 ]
+PartialTruth = Annotated[
+    bool,
+    typer.Option(
+        "--partial-truth",
+        help="The reports cover only some targets: estimates near none of them are no error.",
+    ),
+]
 Out = Annotated[
     Path | None,
     typer.Option("--out", metavar="DIR", help="Folder for results, tracks and figures; default: print only."),
@@ -73,6 +80,7 @@ def track(
     scans: ScansFile,
     sensors: SensorsFile,
     truth: TruthFile = None,
+    partial_truth: PartialTruth = False,
     out: Out = None,
     overwrite: Overwrite = False,
     formats: Formats = None,
@@ -88,10 +96,14 @@ def track(
     figures.
     """
     from vedette.cli.calibrating import calibrate_doubtful
+    from vedette.evaluation.runs import named_target_scores
     from vedette.scenarios.from_recording import scenario_from_recording
 
     identity = _check_output(formats or (), out, overwrite)
-    recorded, warnings = read_recording(sensors, scans, truth, speed=speed, bad_rows=bad_rows, trust=trust)
+    if partial_truth and truth is None:
+        raise usage_error("expected with --truth, which names the reports", "--partial-truth")
+    settings: dict[str, Any] = {"speed": speed, "bad_rows": bad_rows, "partial_truth": partial_truth}
+    recorded, warnings = read_recording(sensors, scans, truth, trust=trust, **settings)
     if "clutter" in recorded.assumed and not calibrate:
         note("`--calibrate` estimates clutter, noise and detection from the same scans.")
     on_earth = [name for name in formats or () if name in ON_EARTH]
@@ -102,7 +114,7 @@ def track(
         record, fit = _tracked(recorded)
         if calibrate and (found := calibrate_doubtful(recorded, fit, sensors)):
             text, calibration = found
-            recorded = scenario_from_recording(sensors, scans, truth, speed=speed, bad_rows=bad_rows, text=text)
+            recorded = scenario_from_recording(sensors, scans, truth, text=text, **settings)
             record, fit = _tracked(recorded)
         scenario = recorded.scenario
         print_run(record, scenario, fit, len(warnings))
@@ -116,7 +128,8 @@ def track(
     if folder is not None:
         echo(f"Wrote {folder}: {', '.join(_contents(folder, written))}")
     origin = {"assumptions": recorded.assumed, "skipped": recorded.recording.skipped, "warnings": warnings}
-    more = {"joins": [join._asdict() for join in joins], "calibration": calibration}
+    targets = [{"name": name, **own._asdict()} for name, own in named_target_scores(record, scenario)]
+    more = {"targets": targets, "joins": [join._asdict() for join in joins], "calibration": calibration}
     emit_json({**run_document(record, scenario, fit), **origin, **more, "folder": folder, "written": written})
 
 

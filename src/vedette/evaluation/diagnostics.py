@@ -7,6 +7,8 @@ from typing import Literal, NamedTuple
 import numpy as np
 
 from vedette.evaluation.health import HealthSums, health_sums, percent
+from vedette.evaluation.metrics.consistency import nees_of_matching
+from vedette.evaluation.metrics.matching import match_run
 from vedette.internal.text import pluralise
 from vedette.kernels.base.types import Floats
 from vedette.kernels.labelled.set_fusion import LOST, SURE
@@ -18,6 +20,7 @@ from vedette.simulation.records import RunRecord
 Level = Literal["ok", "note", "check"]
 _CHECK_ABOVE = 0.01  # share or number above which a truncation should be checked
 _FEW_DROPPED, _MOST_DROPPED = 0.1, 0.5  # shares of the expected births
+_FEW_ERRORS, _WRONG_RATIO = 30, 1.5  # estimates of known targets; error over its bar
 _UNLIKELY = 0.01  # probability of so few reported targets
 
 
@@ -43,10 +46,29 @@ def run_diagnostics(health: Health, sensors: Sequence[str] = ()) -> tuple[Diagno
 
 
 def record_diagnostics(record: RunRecord, scenario: Scenario | None) -> tuple[Diagnostic, ...]:
-    """Return every diagnostic of one run. Without the scenario, those of new targets are left out."""
+    """Return every diagnostic of one run. Without the scenario, those of new targets and of errors are left out."""
     if scenario is None:
         return run_diagnostics(record.health)
-    return (*run_diagnostics(record.health, scenario.model.sensor_names), *birth_diagnostics(record, scenario))
+    of_filters = run_diagnostics(record.health, scenario.model.sensor_names)
+    return (*of_filters, *birth_diagnostics(record, scenario), *_error_diagnostics(record, scenario))
+
+
+def _error_diagnostics(record: RunRecord, scenario: Scenario) -> Iterator[Diagnostic]:
+    """Yield the diagnostic of errors of a recording with known targets. Of simulated runs, NEES is a metric."""
+    if record.recording is None:
+        return
+    ospa = scenario.model.ospa
+    matching = match_run(record.truth, record.estimates, cutoff=ospa.cutoff, order=ospa.order)
+    if (num := len(matching.scans)) < _FEW_ERRORS:
+        return
+    ratio = math.sqrt(0.5 * nees_of_matching(record.truth, matching, position_only=True).mean())
+    yield Diagnostic(
+        "Error bars",
+        "Root mean square of the errors of positions over what the covariances of the estimates say: 1 if they are "
+        "right, above if targets move or sensors err otherwise than the models assume.",
+        f"errors are {ratio:.2g} times what the covariances say, in {num} estimates of known targets",
+        "ok" if 1.0 / _WRONG_RATIO < ratio < _WRONG_RATIO else _level(ratio, _WRONG_RATIO),
+    )
 
 
 def birth_diagnostics(record: RunRecord, scenario: Scenario) -> Iterator[Diagnostic]:

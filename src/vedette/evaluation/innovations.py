@@ -18,6 +18,7 @@ from vedette.models.motion import MotionModel
 from vedette.models.scan_rows import ScanLike, noise_of_rows, values_of
 from vedette.models.sensor import SensorModel
 from vedette.scenarios import Scenario
+from vedette.scenarios.build import build_motion, build_sensor_models
 
 GATE = 4.0  # standard deviations of the innovation
 _STEP = 1e-4  # of central differences, as a share of the standard deviation of a state component
@@ -35,10 +36,7 @@ class Assumed(NamedTuple):
     @classmethod
     def of(cls, scenario: Scenario) -> Assumed:
         """Build the models. Raises `InputError` for custom models that cannot be loaded."""
-        model, folder = scenario.model, scenario.folder
-        region, method, at = model.region.build(), model.filter.gaussian_method, model.filter.detection_at
-        sensors = tuple(each.build(region, method, folder, model.motion.components, at) for each in model.sensors)
-        return cls(scenario, sensors, model.motion.build(folder, method=method))
+        return cls(scenario, build_sensor_models(scenario), build_motion(scenario)[0])
 
 
 class Instant(NamedTuple):

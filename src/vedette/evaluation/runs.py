@@ -1,18 +1,21 @@
 """One run of a scenario under a strategy."""
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
+from vedette.evaluation.metrics.matching import near_targets
 from vedette.evaluation.metrics.point_ospa import ospa_of_run
 from vedette.evaluation.metrics.run import Metric, RunMetrics, measure
+from vedette.evaluation.metrics.targets import TargetScore, target_scores
+from vedette.evaluation.recording_metadata import recording_metadata
 from vedette.kernels.base.types import HEIGHT, place_of
 from vedette.recorded import RecordedScans
 from vedette.scenarios import Scenario, load_scenario
 from vedette.scenarios.build import (
     build_experiment,
     build_planner,
-    build_sensors,
     build_tracking,
     build_true_sensors,
 )
@@ -82,7 +85,10 @@ def build_score(scenario: Scenario) -> Score | None:
     if scenario.model.targets.kind == "unknown":
         return None
     components = places if ospa.components == "position_and_height" else ospa.components
-    return partial(ospa_of_run, cutoff=ospa.cutoff, order=ospa.order, components=components)
+    score = partial(ospa_of_run, cutoff=ospa.cutoff, order=ospa.order, components=components)
+    if ospa.truth == "complete":
+        return score
+    return lambda truth, estimates: score(truth, near_targets(truth, estimates, ospa.cutoff))
 
 
 def custom_metrics(scenario: Scenario) -> tuple[Metric, ...]:
@@ -91,13 +97,21 @@ def custom_metrics(scenario: Scenario) -> tuple[Metric, ...]:
 
 
 def _build_metric(scenario: Scenario, section: AnyMetric) -> Measure:
-    assumed, ospa = tuple(sensor.filter.sensor for sensor in build_sensors(scenario)), scenario.model.ospa
-    sensors = tuple(true.model for true in build_true_sensors(scenario, assumed))
+    ospa, sensors = scenario.model.ospa, tuple(true.model for true in build_true_sensors(scenario))
     metric: Measure = section.build(scenario.folder, sensors=sensors, cutoff=ospa.cutoff, order=ospa.order)
     return metric
 
 
 def measure_run(record: RunRecord, scenario: Scenario, custom: Sequence[Metric] = ()) -> RunMetrics:
-    """Return all measures of a run by its scenario's cutoff, order and window. Raises like `measure`."""
+    """Return all measures of a run by its scenario's cutoff, order, window and truth. Raises like `measure`."""
     ospa = scenario.model.ospa
+    if ospa.truth == "partial":
+        record = replace(record, estimates=tuple(near_targets(record.truth, record.estimates, ospa.cutoff)))
     return measure(record, cutoff=ospa.cutoff, order=ospa.order, window=ospa.window, custom=custom)
+
+
+def named_target_scores(record: RunRecord, scenario: Scenario) -> list[tuple[str, TargetScore]]:
+    """Return the name (by default id + 1) and the score of every true target of a run, none if they are unknown."""
+    ospa, names = scenario.model.ospa, recording_metadata(record, scenario).names
+    scores = target_scores(record, cutoff=ospa.cutoff, order=ospa.order)
+    return [(names[own.target] if names else str(own.target + 1), own) for own in scores]

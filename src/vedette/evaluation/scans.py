@@ -70,9 +70,7 @@ def scans_of_record(record: RunRecord, scenario: Scenario) -> Scans:
     model = scenario.model
     if model.recording is not None:
         return _recorded(record, model.recording, scenario)
-    region, method = model.region.build(), model.filter.gaussian_method
-    sensors = [section.build(region, method, scenario.folder, model.motion.components) for section in model.sensors]
-    true, times = build_true_sensors(scenario, sensors), build_scan_times(scenario)
+    true, times = build_true_sensors(scenario), build_scan_times(scenario)
     scans_at = scan_flags_of_run(times, scan_loss_probabilities(scenario), record.num_scans, record.seed, record.run)
     return scans_of_sensors(record, len(true), partial(sensors_at_step, true, scans_at))
 

@@ -4,6 +4,7 @@ from vedette.models.bias import Bias
 from vedette.models.birth import BirthModel, MeasurementBirth
 from vedette.models.classes import ClassFeatures
 from vedette.models.clutter import ClutterModel, ClutterSampler, measurement_space_clutter
+from vedette.models.correlation import discounted
 from vedette.models.detection import (
     DetectionModel,
     camera,
@@ -25,7 +26,7 @@ from vedette.models.heights import (
 from vedette.models.kinematics import constant_velocity, constant_velocity_height, coordinated_turn
 from vedette.models.manoeuvres import constant_acceleration, constant_turn, ornstein_uhlenbeck, random_walk
 from vedette.models.measurement import MeasurementModel, NoiseModel, position
-from vedette.models.modes import Modes, motion_of_filter, sensor_of_filter
+from vedette.models.modes import Modes, hiding_modes, motion_of_filter, sensor_of_filter
 from vedette.models.motion import MotionModel, SurvivalModel, constant_survival, kernel_motion
 from vedette.models.noise import axis_noise, constant_noise, range_dependent_noise
 from vedette.models.polar import bearing_only, bearing_range, bearing_range_rate, range_only
@@ -77,7 +78,9 @@ __all__ = [
     "constant_velocity",
     "constant_velocity_height",
     "coordinated_turn",
+    "discounted",
     "gaussian_detection",
+    "hiding_modes",
     "kernel_motion",
     "limited_range",
     "limited_sector",

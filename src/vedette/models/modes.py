@@ -1,6 +1,6 @@
 """Motions of targets that change their mode: cruise, turn, stop or hide."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
 
@@ -156,8 +156,52 @@ def check_room_for_modes(motion: MotionModel, max_components: int) -> None:
 
 @lru_cache(maxsize=1000)
 def sensor_of_filter(sensor: SensorModel, motion: MotionModel) -> Sensor:
-    """Return a sensor in kernel form, with the factors of the modes on its probability of detection."""
-    seen = sensor.to_kernel()
-    if not isinstance(motion, Modes) or motion.detection_factors.min() == 1.0:
-        return seen
-    return seen._replace(mode_factors=motion.detection_factors)
+    """Return a sensor in kernel form, with the factors of the modes on its probability of detection.
+
+    Raises `InputError` for factors of the sensor that are not one for each mode of the motion.
+    """
+    seen, factors = sensor.to_kernel(), sensor.mode_factors
+    num = len(motion.motions) if isinstance(motion, Modes) else 1
+    if factors is not None and len(factors) != num:
+        raise reject("SensorModel.mode_factors", f"a factor for each of {num} modes of the motion", factors.tolist())
+    if factors is None and isinstance(motion, Modes):
+        factors = motion.detection_factors
+    return seen if factors is None or factors.min() == 1.0 else seen._replace(mode_factors=factors)
+
+
+def hiding_modes(motion: MotionModel, stays_s: Mapping[str, tuple[float, float]]) -> tuple[Modes, dict[str, Floats]]:
+    """Return the motion of targets that hide from sensors, from each by itself, and the factors of each sensor.
+
+    A mode of the result is a mode of the given motion with a visible or hidden target for each of the sensors, which
+    change independently of each other. A new target is visible to a sensor as often as in the long term.
+
+    Args:
+        motion: in the time between, which may have modes.
+        stays_s: mean times for which a target is visible to a sensor, and hidden from it, s, by the sensor's name.
+
+    Returns the motion and, for each sensor, its `SensorModel.mode_factors`.
+    """
+    base = motion if isinstance(motion, Modes) else Modes((motion,), (np.inf,), names=("",), method=motion.method)
+    motions, names, rates, at_birth = list(base.motions), list(base.names), base.rates, base.at_birth
+    own, factors = base.detection_factors, dict[str, Floats]()
+    for sensor, (visible, hidden) in stays_s.items():
+        chain = np.array([[-1.0 / visible, 1.0 / visible], [1.0 / hidden, -1.0 / hidden]])
+        rates = np.asarray(np.kron(rates, np.eye(2)) + np.kron(np.eye(len(rates)), chain), np.float64)
+        at_birth = np.asarray(np.kron(at_birth, np.array([visible, hidden]) / (visible + hidden)), np.float64)
+        motions = [each for each in motions for _ in range(2)]
+        hides = [f"{name}, hidden from {sensor}".removeprefix(", ") for name in names]
+        names = [name for pair in zip(names, hides, strict=True) for name in pair]
+        own, factors = np.repeat(own, 2), {name: np.repeat(each, 2) for name, each in factors.items()}
+        factors[sensor] = np.tile([1.0, 0.0], len(names) // 2)
+    stays = -1.0 / np.diag(rates)
+    made = Modes(
+        motions,
+        stays,
+        names=["visible", *names[1:]] if names[0] == "" else names,
+        to=(rates - np.diag(np.diag(rates))) * stays[:, np.newaxis],
+        at_birth=at_birth,
+        detection_factors=own,
+        merge_distance=base.merge_distance,
+        method=motion.method,
+    )
+    return made, {name: own * each for name, each in factors.items()}

@@ -159,3 +159,6 @@ def _growth(component: str, sigma: float | None, eta: float) -> list[float]:
     if eta != 0.0:
         raise reject(f"eta_{component}", f"0 where no sigma_{component} is given", eta)
     return []
+
+
+BUILT_IN = frozenset({_constant, _by_axis, _bearing_range, _with_third, _bearing, _range})  # linear in their parameters

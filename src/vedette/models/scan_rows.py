@@ -186,6 +186,14 @@ def with_added_noise(scan: ScanLike, added: Floats) -> ScanRows:
     return _unchecked(values, noise, added + before if len(before) else added, *ratios)
 
 
+def with_scaled_noise(scan: ScanLike, factor: float) -> ScanLike:
+    """Return a scan with this many times the covariances that its rows bring in place of those of the noise model."""
+    if not isinstance(scan, ScanRows):
+        return scan
+    values, noise, *others = to_measurements(scan)
+    return _unchecked(values, factor * noise, *others)
+
+
 @cache
 def _nothing(meas_dim: int) -> tuple[Floats, ...]:
     return ScanRows(np.empty((0, meas_dim))).to_kernel()[1:]

@@ -56,6 +56,8 @@ class SensorModel:
             the Gaussian, a miss moves the density to places of low P_D, and a detection has the mean P_D of the
             density after it. None: the mean in filters of a factored GLMB, else the centre. The `sensor` of a filter
             has the value in use.
+        mode_factors: (num_modes,) factor of each mode of the targets on the probability of detection by this sensor,
+            in [0, 1]. 0 is hidden. None: those of the motion (`Modes.detection_factors`).
         meas_dim: number of components of a measurement.
 
     Raises:
@@ -69,6 +71,7 @@ class SensorModel:
     clutter: ClutterModel
     method: str = "auto"
     detection_at: str | None = None
+    mode_factors: Floats | None = None
     meas_dim: int = field(init=False)
 
     def __post_init__(self) -> None:
@@ -87,6 +90,11 @@ class SensorModel:
         resolve_method("SensorModel.method", self.method, self.measurement.jacobian is not None)
         if self.detection_at is not None:
             one_of("SensorModel.detection_at", self.detection_at, ("centre", "mean"))
+        if self.mode_factors is not None:
+            factors = float_array("SensorModel.mode_factors", self.mode_factors, (None,))
+            if not ((factors >= 0.0) & (factors <= 1.0)).all():
+                raise reject("SensorModel.mode_factors", "numbers in [0, 1]", factors.tolist())
+            object.__setattr__(self, "mode_factors", factors)
         self._check_bearings()
 
     def _check_bearings(self) -> None:

@@ -13,6 +13,7 @@ from vedette.scenarios.assumptions import assumed_birth, assumed_motion, assumed
 from vedette.scenarios.loading import Scenario
 from vedette.scenarios.recorded_data import recorded_scans
 from vedette.scenarios.region import describe_region, reached_region
+from vedette.scenarios.sections import ScenarioModel
 from vedette.scenarios.sensors_file import MAX_STEPS, placeholder_sections, read_sensors_file, validated_model
 
 _MAX_HORIZON_STEPS = 100  # steps of a horizon
@@ -38,6 +39,7 @@ def scenario_from_recording(
     speed: float = 10.0,
     bad_rows: str = "refuse",
     text: str | None = None,
+    partial_truth: bool = False,
 ) -> RecordingScenario:
     """Return the scenario of recorded scans.
 
@@ -49,6 +51,7 @@ def scenario_from_recording(
         speed: m/s that targets hardly exceed; motion and births are derived from it unless they are given.
         bad_rows: "refuse" or "skip", see `vedette.recorded.Conventions`.
         text: contents of the sensors file; None: those on disk.
+        partial_truth: True if the reports cover only some targets (`ospa.truth`).
 
     Raises:
         InputError: a file that does not exist, or rows that cannot be read.
@@ -74,10 +77,14 @@ def scenario_from_recording(
         given["targets"] = {**targets, "kind": "recorded", "path": str(truth.resolve())}
     elif not _are_recorded(given.get("targets")):
         given["targets"] = {"kind": "unknown"}
+    if partial_truth:
+        score = given.get("ospa")
+        given["ospa"] = {**(score if isinstance(score, Mapping) else {}), "truth": "partial"}
     provisional = {**placeholder_sections(given, speed), **given}
     provisional["targets"] = {"kind": "unknown"}
     model = validated_model(document, provisional, sensors)
     recording = recorded_scans(model, sensors.parent)
+    given["sensors"] = _with_intervals(given, model, recording)
     descriptions = dict[str, str]()
     assumed = assumed_sections(given, model, recording, sensors.parent, speed, descriptions)
     section = given["targets"]
@@ -86,6 +93,17 @@ def scenario_from_recording(
     return RecordingScenario(
         Scenario(validated_model(document, {**given, **assumed}, sensors), sensors), recording, descriptions
     )
+
+
+def _with_intervals(given: Mapping[str, Any], model: ScenarioModel, recording: RecordedScans) -> Any:
+    """Return the section `sensors` with the median time between scans where errors last and none is given."""
+    sections = list(given["sensors"])
+    for s, (section, sensor) in enumerate(zip(sections, model.sensors, strict=True)):
+        times = recording.times[[instant[s] is not None for instant in recording.scans]]
+        if sensor.correlation.noise_s > 0.0 and sensor.correlation.interval_s is None and len(times) > 1:
+            own = sensor.correlation.model_dump() | {"interval_s": float(np.median(np.diff(times)))}
+            sections[s] = {**section, "correlation": own}
+    return sections
 
 
 class LiveScenario(NamedTuple):
@@ -137,6 +155,9 @@ def scenario_from_sensors(
     if plan_within is not None:
         completed["control"] = {**(completed.get("control") or {}), "max_seconds": plan_within}
     model = validated_model(document, completed, sensors)
+    for sensor in model.sensors:
+        if sensor.correlation.noise_s > 0.0:
+            sensor.correlation.interval(sensor.scans, None)
     if "region" not in given:
         completed["region"] = region = reached_region(model, sensors)
         descriptions["region"] = f"{describe_region(region)} (as far as the sensors see from their first positions)"

@@ -15,6 +15,7 @@ from vedette.simulation.experiment import Experiment
 from vedette.simulation.journal import Journal, Score
 from vedette.simulation.records import RunRecord
 from vedette.simulation.scans import Scan, active_scans, simulate_scans
+from vedette.simulation.true_sensors import ErrorMemory
 from vedette.simulation.truth import Truth
 from vedette.tracking import Central, StageTimer, State, Tracker, TrackerInfo
 
@@ -110,7 +111,7 @@ class SimulationRun:
         self.experiment, self.seed, self.run = experiment, seed, run
         self.truth = truth_of_run(experiment, seed, run) if truth is None else truth
         scans, filters = (sensor_streams(seed, run, stream, experiment.num_sensors) for stream in (SCANS, FILTER))
-        self._scan_rngs = scans
+        self._scan_rngs, self._memories = scans, [ErrorMemory() for _ in scans]
         self._scans_at = scan_flags_of_run(
             experiment.scans_at, experiment.scan_loss_probability, len(experiment.times), seed, run
         )
@@ -155,7 +156,16 @@ class SimulationRun:
             ids, states = self.truth.at(step - 1)
             sensors = experiment.sensors_at(step, self._scans_at)
             factors = self.truth.detection_factors_at(step - 1)
-            drawn = simulate_scans(states, poses, sensors, ids=ids, detection_factors=factors, rngs=self._scan_rngs)
+            drawn = simulate_scans(
+                states,
+                poses,
+                sensors,
+                ids=ids,
+                detection_factors=factors,
+                rngs=self._scan_rngs,
+                memories=self._memories,
+                time=time,
+            )
             scans = active_scans(drawn, off)
             measurements = tuple([None if scan is None else scan.measurements for scan in scans])
         tracked = self._tracker.step(step, measurements, poses, time, clock)

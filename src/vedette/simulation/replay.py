@@ -8,7 +8,7 @@ from vedette.simulation.experiment import Experiment
 from vedette.simulation.loop import SCANS, scan_flags_of_run, sensor_streams
 from vedette.simulation.records import RunRecord
 from vedette.simulation.scans import Scan, active_scans, simulate_scans
-from vedette.simulation.true_sensors import TrueSensor
+from vedette.simulation.true_sensors import ErrorMemory, TrueSensor
 
 
 def scans_of(record: RunRecord, experiment: Experiment) -> tuple[tuple[Scan | None, ...], ...]:
@@ -41,9 +41,18 @@ def scans_of_sensors(
     if record.num_sensors != num_sensors:
         raise InputError(f"record: expected {num_sensors} sensors; got {record.num_sensors}")
     streams, truth = sensor_streams(record.seed, record.run, SCANS, num_sensors), record.truth
-    scans: list[tuple[Scan | None, ...]] = []
+    scans, memories = list[tuple[Scan | None, ...]](), [ErrorMemory() for _ in streams]
     for step in range(record.num_scans):
         (ids, states), factors, sensors = truth.at(step), truth.detection_factors_at(step), sensors_at(step + 1)
-        drawn = simulate_scans(states, record.poses[step], sensors, ids=ids, detection_factors=factors, rngs=streams)
+        drawn = simulate_scans(
+            states,
+            record.poses[step],
+            sensors,
+            ids=ids,
+            detection_factors=factors,
+            rngs=streams,
+            memories=memories,
+            time=float(record.times[step]),
+        )
         scans.append(active_scans(drawn, record.off[step]))
     return tuple(scans)

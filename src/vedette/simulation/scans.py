@@ -16,7 +16,7 @@ from vedette.models.arguments import float_array, generator, pose_vector, reject
 from vedette.models.bias import NO_BIAS, with_offsets
 from vedette.models.functions import numbers_at, write_rows
 from vedette.models.measurement import wrap_periodic
-from vedette.simulation.true_sensors import TrueSensor
+from vedette.simulation.true_sensors import ErrorMemory, TrueSensor
 from vedette.tracking import StageTimer
 
 
@@ -61,7 +61,7 @@ def simulate_scan(
     """
     states, pose = float_array("truth_states", truth_states, (None, None)), pose_vector("pose", pose)
     factors = _factors(detection_factors, len(states))
-    return _drawn(states, _named(ids, len(states)), factors, pose, sensor, generator(rng))
+    return _drawn(states, _named(ids, len(states)), factors, pose, sensor, generator(rng), ErrorMemory(), 0.0)
 
 
 def _named(ids: ArrayLike | None, num: int) -> Ints:
@@ -87,13 +87,18 @@ def _drawn(
     pose: Floats,
     sensor: SensorModel | TrueSensor,
     rng: np.random.Generator,
+    memory: ErrorMemory,
+    time: float,
 ) -> Scan:
     """Return one scan from checked arguments."""
     true = sensor if isinstance(sensor, TrueSensor) else TrueSensor(sensor)
     num, model = len(states), true.model
     uniforms = rng.random(num)
     states, true_pose = (states, pose) if true.bias is NO_BIAS else _shown(true, states, pose)
-    measured = _noisy_measurements(model, states, true_pose, rng.standard_normal((num, model.meas_dim)))
+    normals = rng.standard_normal((num, model.meas_dim))
+    luck = np.zeros(num) if true.stays_s is None else rng.random(num)
+    factors = factors * memory.lasting(true, time, names, normals, luck)
+    measured = _noisy_measurements(model, states, true_pose, normals)
     detected = _seen(model, _detected_at(true, states, true_pose, measured), true_pose, factors, uniforms)
     clutter = model.clutter.sample(true_pose, model.measurement, state_dim=states.shape[1], rng=rng)
     order = rng.random(num + len(clutter)).argsort()
@@ -111,6 +116,8 @@ def simulate_scans(
     ids: ArrayLike | None = None,
     detection_factors: ArrayLike | None = None,
     rngs: Sequence[np.random.Generator],
+    memories: Sequence[ErrorMemory] | None = None,
+    time: float = 0.0,
 ) -> tuple[Scan, ...]:
     """Return one scan per sensor if all scan."""
 
@@ -124,6 +131,8 @@ def simulate_scans(
     ids: ArrayLike | None = None,
     detection_factors: ArrayLike | None = None,
     rngs: Sequence[np.random.Generator],
+    memories: Sequence[ErrorMemory] | None = None,
+    time: float = 0.0,
 ) -> tuple[Scan | None, ...]:
     """Return one scan per sensor, None for those that do not scan."""
 
@@ -136,18 +145,24 @@ def simulate_scans(
     ids: ArrayLike | None = None,
     detection_factors: ArrayLike | None = None,
     rngs: Sequence[np.random.Generator],
+    memories: Sequence[ErrorMemory] | None = None,
+    time: float = 0.0,
 ) -> tuple[Scan | None, ...]:
     """Return one scan per sensor, each with its own pose and random numbers. See `simulate_scan`.
 
     A sensor that is None does not scan and draws nothing. Its entry is None.
+
+    memories: of the errors of each sensor, which this changes. None: they do not last. time: of the scans, s.
     """
     states, stages, scans = float_array("truth_states", truth_states, (None, None)), StageTimer(), list[Scan | None]()
     names, factors = _named(ids, len(states)), _factors(detection_factors, len(states))
-    for s, (pose, sensor, rng) in enumerate(zip(poses, sensors, rngs, strict=True)):
+    kept = [ErrorMemory() for _ in sensors] if memories is None else memories
+    for s, (pose, sensor, rng, memory) in enumerate(zip(poses, sensors, rngs, kept, strict=True)):
         with stages.timing("scans", s):
             drawn = None
             if sensor is not None:
-                drawn = _drawn(states, names, factors, pose_vector("pose", pose), sensor, generator(rng))
+                at = pose_vector("pose", pose)
+                drawn = _drawn(states, names, factors, at, sensor, generator(rng), memory, time)
             scans.append(drawn)
     return tuple(scans)
 

@@ -1,16 +1,19 @@
 """True sensors of the simulation, which may differ from the sensor models of the filters."""
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Literal
 
+import numpy as np
+
 from vedette.errors import InputError
 from vedette.internal.quantities import ONLY_MEASURED
-from vedette.kernels.base.types import Bools
+from vedette.kernels.base.types import Bools, Floats, Ints
 from vedette.models import Bias, DetectionModel, SensorModel
 from vedette.models.arguments import reject
 from vedette.models.bias import NO_BIAS
-from vedette.models.fields import check_fields
+from vedette.models.fields import NonNegative, check_fields
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -23,6 +26,8 @@ class TrueSensor:
         detection_of: state at which the detection probability is evaluated: the target's true "state", or with the
             position that the "measurement" gives (`MeasurementModel.places`), noise included. The rest of the state
             stays.
+        noise_s: correlation time of the errors of a target, s. 0: they are independent from scan to scan.
+        stays_s: mean times for which it sees a target, by its detection, and does not, s. None: it always may.
         bias: bias of its scans, measured minus true. With a positive clock bias, measurements are of slightly earlier
             positions, by the targets' velocities.
 
@@ -35,6 +40,8 @@ class TrueSensor:
     first_detection: DetectionModel | None = None
     detection_of: Literal["state", "measurement"] = "state"
     bias: Bias = NO_BIAS
+    noise_s: NonNegative = 0.0
+    stays_s: tuple[float, float] | None = None
 
     def __post_init__(self) -> None:
         check_fields(self, "TrueSensor.")
@@ -50,6 +57,40 @@ class TrueSensor:
         if self.first_detection is None:
             return self
         return replace(self, model=replace(self.model, detection=self.first_detection), first_detection=None)
+
+
+class ErrorMemory:
+    """Error and visibility of each target at the last scan of one sensor, where they last.
+
+    Standard normal errors are a first-order autoregressive (Gauss-Markov) sequence of the sensor's correlation time.
+    Whether a target is visible is a Markov chain in continuous time, first in its long term.
+    """
+
+    def __init__(self) -> None:
+        self._last: dict[int, tuple[float, Floats, bool]] = {}
+
+    def lasting(self, sensor: TrueSensor, time: float, ids: Ints, normals: Floats, luck: Floats) -> Bools:
+        """Return whether each target is visible at a time, s, (num_targets,), and make its error last.
+
+        normals: (num_targets, meas_dim) new independent errors, which are changed. luck: (num_targets,) uniform
+        numbers, which decide on the visibility.
+        """
+        visible = np.ones(len(ids), np.bool_)
+        if not sensor.noise_s and sensor.stays_s is None:
+            return visible
+        seen, hidden = sensor.stays_s or (1.0, 0.0)
+        share = seen / (seen + hidden)
+        for i, target in enumerate(ids.tolist()):
+            chance = share
+            if target in self._last:
+                before, errors, was_visible = self._last[target]
+                kept = math.exp((before - time) / sensor.noise_s) if sensor.noise_s else 0.0
+                normals[i] = kept * errors + math.sqrt(1.0 - kept * kept) * normals[i]
+                if hidden:
+                    chance += (was_visible - share) * math.exp((before - time) * (1.0 / seen + 1.0 / hidden))
+            visible[i] = luck[i] < chance
+            self._last[target] = time, normals[i].copy(), bool(visible[i])
+        return visible
 
 
 def true_sensors_of(given: Sequence[TrueSensor], known: Sequence[SensorModel]) -> tuple[TrueSensor, ...]:

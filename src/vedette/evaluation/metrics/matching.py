@@ -1,7 +1,7 @@
 """Matching of a run's estimates with targets at each scan, the basis of all metrics of pairs and of labels."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 import numpy as np
 
@@ -119,6 +119,20 @@ def match_run(truth: Truth, estimates: Sequence[Estimate], *, cutoff: float, ord
         means=means[estimate_rows],
         covs=covs[estimate_rows],
     )
+
+
+def near_targets(truth: Truth, estimates: Sequence[Estimate], cutoff: float) -> list[Estimate]:
+    """Return the estimates without those as far as the cutoff, m, from every target: of targets without truth.
+
+    Raises `InputError` unless there is one estimate per scan.
+    """
+    check_scans(truth, estimates)
+    kept = list[Estimate]()
+    for scan, estimate in enumerate(estimates):
+        offsets = estimate.means[:, np.newaxis, :2] - truth.at(scan)[1][np.newaxis, :, :2]
+        near = (np.hypot(offsets[..., 0], offsets[..., 1]) < cutoff).any(axis=1)
+        kept.append(Estimate(*(getattr(estimate, each.name)[near] for each in fields(Estimate))))
+    return kept
 
 
 def _stacked(estimates: Sequence[Estimate]) -> tuple[Ints, Floats, Floats]:

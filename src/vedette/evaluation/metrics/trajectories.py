@@ -36,7 +36,16 @@ def continuity_of_run(truth: Truth, estimates: Sequence[Estimate], *, cutoff: fl
 
 
 def continuity(truth: Truth, matching: Matching) -> Continuity:
-    """Return the label switches and fragmentations from the matching of a run.
+    """Return the label switches and fragmentations from the matching of a run, see `continuity_of_pairs`."""
+    switched, broken = continuity_of_pairs(truth, matching)
+    return Continuity(
+        np.bincount(matching.scans[switched], minlength=matching.num_scans),
+        np.bincount(matching.scans[broken], minlength=matching.num_scans),
+    )
+
+
+def continuity_of_pairs(truth: Truth, matching: Matching) -> tuple[Ints, Ints]:
+    """Return the pairs of a matching with a label switch, and those after a break.
 
     Each scan is matched separately. CLEAR MOT instead keeps a pair of the last scan as long as it is within the cutoff,
     and so counts fewer switches among targets closer to each other than that. The first match of a target, and a target
@@ -50,10 +59,7 @@ def continuity(truth: Truth, matching: Matching) -> Continuity:
     switched = same_target & (matching.labels[before] != matching.labels[after]).any(axis=1)
     age = _ages(truth)[matching.truth_rows]
     broken = same_target & (age[after] - age[before] > 1)
-    scans, num_scans = matching.scans[after], matching.num_scans
-    return Continuity(
-        np.bincount(scans[switched], minlength=num_scans), np.bincount(scans[broken], minlength=num_scans)
-    )
+    return after[switched], after[broken]
 
 
 def _ages(truth: Truth) -> Ints:

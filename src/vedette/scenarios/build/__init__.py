@@ -6,8 +6,10 @@ Each section builds its own part (`vedette.scenarios.sections`); here they are p
 from vedette.scenarios.build.experiments import build_experiment, build_targets, build_tracking
 from vedette.scenarios.build.planners import build_parts, build_planner
 from vedette.scenarios.build.sensors import (
+    build_motion,
     build_poses,
     build_scan_times,
+    build_sensor_models,
     build_sensors,
     build_true_sensors,
     scan_loss_probabilities,
@@ -16,10 +18,12 @@ from vedette.scenarios.build.trackers import scene_for_program
 
 __all__ = [
     "build_experiment",
+    "build_motion",
     "build_parts",
     "build_planner",
     "build_poses",
     "build_scan_times",
+    "build_sensor_models",
     "build_sensors",
     "build_targets",
     "build_tracking",

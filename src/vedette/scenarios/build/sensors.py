@@ -1,7 +1,6 @@
 """The sensors of a scenario: their filters and platforms, where they start and when they scan."""
 
 import math
-from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -10,8 +9,11 @@ import numpy as np
 
 from vedette.control import MobileSensor
 from vedette.filters import Filter, PredictUpdateFilter
+from vedette.internal.unit_warnings import suppress_unit_warnings
 from vedette.kernels.base.types import OWN_VELOCITY, VISITS, Bools, Floats
-from vedette.models import SensorModel, TargetModel
+from vedette.models import MotionModel, SensorModel, TargetModel
+from vedette.models.correlation import discounted
+from vedette.models.modes import hiding_modes
 from vedette.platforms import Actions, ByCompass, Operated, Patrolling, Platform
 from vedette.platforms.base import SWITCH, actions_at
 from vedette.platforms.velocity import WithVelocity
@@ -34,16 +36,18 @@ def build_sensors(scenario: Scenario) -> tuple[MobileSensor, ...]:
         InputError: a custom model that cannot be loaded, or parts that do not fit together.
     """
     model, folder = scenario.model, scenario.folder
-    method, region = model.filter.gaussian_method, model.region.build()
     birth = model.birth.build(model.motion, model.region)
     targets = TargetModel(
-        model.motion.build(folder, method=method),
+        build_motion(scenario)[0],
         model.survival.build(folder),
         replace(birth, anywhere=undetected_anywhere(model, birth), class_probs=model.class_probs),
     )
     sensors = []
-    for sensor in model.sensors:
-        assumed = sensor.build(region, method, folder, model.motion.components, model.filter.detection_at)
+    for sensor, built in zip(model.sensors, build_sensor_models(scenario), strict=True):
+        assumed, lasts = built, sensor.correlation
+        if lasts.noise_s > 0.0:
+            interval = lasts.interval(sensor.scans, None if model.recording else model.time.step_period)
+            assumed = discounted(built, interval, lasts.noise_s)
         local = model.filter.build(targets, assumed, folder)
         _check_custom_parts(scenario, sensor, assumed, local)
         sensors.append(MobileSensor(local, _platform(model, sensor, folder), _scan_times(model, sensor)))
@@ -107,13 +111,38 @@ def _check_custom_parts(scenario: Scenario, section: Sensor, sensor: SensorModel
         raise MissingMember(model.filter, "function", expected, f"a {type(local).__name__}")
 
 
-def build_true_sensors(scenario: Scenario, assumed: Sequence[SensorModel]) -> tuple[TrueSensor, ...]:
-    """Return the true sensors for those that the filters assume; raises like `build_sensors`."""
+def build_motion(scenario: Scenario) -> tuple[MotionModel, dict[str, Floats]]:
+    """Return the motion for filters, with modes if targets hide from sensors, and these sensors' factors by name."""
     model = scenario.model
-    region = model.region.build()
-    pairs = zip(model.sensors, assumed, strict=True)
-    given = region, scenario.folder, model.motion.components
-    return tuple(section.build_true(sensor, *given) for section, sensor in pairs)
+    motion = model.motion.build(scenario.folder, method=model.filter.gaussian_method)
+    pairs = zip(model.sensor_names, model.sensors, strict=True)
+    stays = {name: own for name, sensor in pairs if (own := sensor.correlation.stays_s) is not None}
+    return hiding_modes(motion, stays) if stays else (motion, {})
+
+
+def build_sensor_models(scenario: Scenario) -> tuple[SensorModel, ...]:
+    """Return the models of the sensors as the scenario gives them, whose errors may last.
+
+    Raises `InputError` for a custom model that cannot be loaded, or parts that do not fit together.
+    """
+    model, factors = scenario.model, dict[str, Floats]()
+    if any(section.correlation.stays_s for section in model.sensors):
+        factors = build_motion(scenario)[1]
+    given = model.region.build(), model.filter.gaussian_method, scenario.folder, model.motion.components
+    built = [section.build(*given, model.filter.detection_at) for section in model.sensors]
+    with suppress_unit_warnings():
+        return tuple(
+            replace(each, mode_factors=factors[name]) if name in factors else each
+            for name, each in zip(model.sensor_names, built, strict=True)
+        )
+
+
+def build_true_sensors(scenario: Scenario) -> tuple[TrueSensor, ...]:
+    """Return the true sensors; raises like `build_sensor_models`."""
+    model = scenario.model
+    given = model.region.build(), scenario.folder, model.motion.components
+    pairs = zip(model.sensors, build_sensor_models(scenario), strict=True)
+    return tuple(section.build_true(known, *given) for section, known in pairs)
 
 
 def scan_loss_probabilities(scenario: Scenario) -> tuple[float, ...]:

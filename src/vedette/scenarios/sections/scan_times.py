@@ -1,4 +1,4 @@
-"""Section about the times of a sensor's scans, and their delays."""
+"""Sections about the times of a sensor's scans, their delays, and errors that last from scan to scan."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from pydantic import Field
 
+from vedette.errors import InputError
 from vedette.scenarios.diagnostics import Finding, describe
 from vedette.scenarios.sections.base import NonNegative, Positive, Probability, Section, Share, Step, check
 
@@ -90,3 +91,48 @@ class ScanTimes(Section):
         """Return True for each step with a scan, (num_steps,), before drop-outs."""
         every, first = self.steps(time.step_period)
         return np.asarray((np.arange(1, time.num_steps + 1) - first) % every == 0)
+
+
+class Correlation(Section):
+    """Correlation times of the errors of a sensor, and for how long it sees a target or not.
+
+    Filters, which take errors as independent, count each scan for less. They keep for each target whether it is visible
+    or hidden, in place of a probability of detection of each scan by itself.
+    """
+
+    noise_s: NonNegative = Field(default=0.0, description="Correlation time of the errors of a target [s].")
+    interval_s: Positive | None = Field(
+        default=None,
+        description="Time between two scans; none: `scans.period`, or the median of a recording; needed live [s].",
+    )
+    visible_s: Positive | None = Field(
+        default=None,
+        description="Mean time for which a target stays visible; `detection` is its detection meanwhile; none: it is "
+        "never hidden [s].",
+    )
+    hidden_s: Positive | None = Field(
+        default=None, description="Mean time for which a target stays hidden, with visible_s [s]."
+    )
+
+    @check
+    def _both_stays(self) -> Iterator[Finding]:
+        if (self.visible_s is None) != (self.hidden_s is None):
+            missing = "visible_s" if self.visible_s is None else "hidden_s"
+            yield (missing,), "a time in s, as of visible_s and hidden_s both or none are given", "none"
+
+    @property
+    def stays_s(self) -> tuple[float, float] | None:
+        """Mean times for which a target is visible and hidden, s, or None if it is never hidden."""
+        return None if self.visible_s is None or self.hidden_s is None else (self.visible_s, self.hidden_s)
+
+    def interval(self, scans: ScanTimes, step_period: float | None) -> float:
+        """Return the time between two scans, s. step_period: of a simulation, s; None: of recorded or live scans.
+
+        Raises `InputError` if it is not known.
+        """
+        if self.interval_s is not None:
+            return self.interval_s
+        if step_period is None:
+            wanted = "the time between two scans, in s, where errors last and scans are not simulated"
+            raise InputError(f"correlation.interval_s: expected {wanted}; got none")
+        return scans.steps(step_period)[0] * step_period

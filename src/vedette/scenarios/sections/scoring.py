@@ -115,6 +115,11 @@ class Ospa(Section):
         "with metres, m/s and rad/s as numbers of one kind, and the cutoff in no unit. Measures beside OSPA are of "
         "positions in the plane [-].",
     )
+    truth: Literal["complete", "partial"] = Field(
+        default="complete",
+        description="Whether all targets are known, or only some of them, such as ships with AIS. With partial truth "
+        "no estimate counts that is as far as the cutoff from every known target [-].",
+    )
     window: Count = Field(default=10, description="Scans of the window of OSPA(2) [-].")
     first_scan: Count | None = Field(
         default=None, description="First scan of the reported mean; none: the one after the first decision, or 1 [-]."

@@ -26,7 +26,7 @@ from vedette.scenarios.sections.base import (
 )
 from vedette.scenarios.sections.derived import Part, derived, of_kind
 from vedette.scenarios.sections.platforms import AnyPlatform
-from vedette.scenarios.sections.scan_times import ScanTimes
+from vedette.scenarios.sections.scan_times import Correlation, ScanTimes
 from vedette.scenarios.sections.sensing import (
     Clutter,
     Detection,
@@ -196,7 +196,9 @@ class Sensor(Section):
     )
     detection: Detection = Field(default=of_kind("gaussian"), description="Probability of detection [-].")
     clutter: Clutter = Field(default=of_kind("region"), description="False measurements [-].")
-
+    correlation: Correlation = Field(
+        default=Correlation(), description="Of errors and visibility from scan to scan [-]."
+    )
     bias: BiasSection = Field(
         default=BiasSection(),
         description="What its scans say too much, taken off before filters see them; `vedette calibrate` finds it [-].",
@@ -259,6 +261,11 @@ class Sensor(Section):
             yield from self.true_parameters.findings_beside(self.measurement)
 
     @property
+    def is_not_as_assumed(self) -> bool:
+        """True if the true sensor of a simulation differs from the model of the filters."""
+        return self.true_parameters is not None or self.correlation != Correlation()
+
+    @property
     def pose(self) -> tuple[float, ...]:
         """Pose at the start: [px, py, heading_rad], and further components of its platform."""
         pose = (*self.position, math.radians(self.heading_deg), *self.platform.components())
@@ -295,11 +302,11 @@ class Sensor(Section):
             return SensorModel(**parts, method=method, detection_at=detection_at)
 
     def build_true(self, known: SensorModel, region: Region, folder: Path, state: Names) -> TrueSensorModel:
-        """Return the true sensor for the model in the filters; raises like `build`."""
+        """Return the true sensor for the model that `build` returns; raises like it."""
         from vedette.simulation.true_sensors import TrueSensor as Made
 
         if self.true_parameters is None:
-            return Made(known)
+            return Made(known, noise_s=self.correlation.noise_s, stays_s=self.correlation.stays_s)
         made = self.true_parameters.build(known, self, region, folder, state)
         # The bias of a compass is clockwise; simulated bearings are from the east.
         return replace(made, bias=replace(made.bias, bearing=-made.bias.bearing)) if self.compass else made

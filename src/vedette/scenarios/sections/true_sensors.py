@@ -14,6 +14,7 @@ from vedette.internal.unit_warnings import suppress_unit_warnings
 from vedette.scenarios.diagnostics import Finding, describe
 from vedette.scenarios.sections.base import Section
 from vedette.scenarios.sections.derived import Part, derived
+from vedette.scenarios.sections.scan_times import Correlation
 from vedette.scenarios.sections.sensing import (
     Clutter,
     Detection,
@@ -76,6 +77,9 @@ class TrueSensor(Section):
     first_detection: Detection | None = Field(
         default=None, description="Probability of detection at its first scan alone; none: as at the others [-]."
     )
+    correlation: Correlation | None = Field(
+        default=None, description="Of errors and visibility; none: as the filters know it [-]."
+    )
     detection_of: Literal["state", "measurement"] = Field(
         default="state",
         description="Where the probability of detection is taken: at the target's true state, or at the position that "
@@ -118,4 +122,5 @@ class TrueSensor(Section):
             model = replace(known, method="auto", **parts)
         first = None if self.first_detection is None else self.first_detection.build(folder)
         left = NO_BIAS if self.bias is None else self.bias.build() - sensor.bias.build()
-        return Made(model, first, self.detection_of, left)
+        lasts = self.correlation or sensor.correlation
+        return Made(model, first, self.detection_of, left, lasts.noise_s, lasts.stays_s)
