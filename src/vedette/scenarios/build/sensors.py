@@ -14,8 +14,7 @@ from vedette.kernels.base.types import OWN_VELOCITY, VISITS, Bools, Floats
 from vedette.models import SensorModel, TargetModel
 from vedette.platforms import Actions, ByCompass, Operated, Patrolling, Platform
 from vedette.platforms.base import SWITCH, actions_at
-from vedette.platforms.velocity import WithVelocity
-from vedette.platforms.wrapper import PlatformWrapper
+from vedette.platforms.wrapper import PlatformWrapper, WithVelocity
 from vedette.scenarios.loading import Scenario
 from vedette.scenarios.sections.custom import Custom, MissingMember
 from vedette.scenarios.sections.deciding import Lookahead
