@@ -8,7 +8,11 @@ class VedetteError(Exception):
 
 
 class InputError(VedetteError, ValueError):
-    """An argument, scan, file or folder that cannot be used."""
+    """An argument, scan, file or folder that cannot be used.
+
+    Every constructor raises it for an argument of another type, or outside the domain that its type or its description
+    states.
+    """
 
 
 class MissingPackageError(InputError, ImportError):

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from vedette import models
-from vedette.control.camera_turning import seconds_to_search, seconds_to_turn, turn_rate, turned_on
+from vedette.control.extrapolation import seconds_to_search, seconds_to_turn, turn_rate, turned_on
 from vedette.densities import UndetectedIntensity
 from vedette.evaluation.runs import run_scenario
 from vedette.platforms import HeadingPlatform, Pointing

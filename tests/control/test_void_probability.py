@@ -14,7 +14,7 @@ from scipy.special import ndtr
 
 from control.examples import A, B, C, glmb, lmb
 from vedette.control import ConstraintContext, VoidProbability, feasible_action_mask, void_probability
-from vedette.control.constraints.discs import disc_probabilities, near_pairs
+from vedette.control.constraints.void import disc_probabilities, near_pairs
 from vedette.densities import GLMB, LMB, FactoredGLMB, as_glmb
 from vedette.errors import InputError
 
@@ -79,7 +79,7 @@ def test_many_discs_in_blocks(monkeypatch: pytest.MonkeyPatch) -> None:
     offsets, which = draw.normal(0.0, 2.0, (60, 2)), draw.integers(3, size=60)
     covs = np.array([covariance(2.0, 0.1, 0.3), covariance(0.5, 0.02, 1.0), covariance(0.1, 1.0, 0.0)])
     whole = disc_probabilities(offsets, which, covs, 1.5)
-    monkeypatch.setattr("vedette.control.constraints.discs._BLOCK", 100)
+    monkeypatch.setattr("vedette.control.constraints.void._NODES_AT_ONCE", 100)
     np.testing.assert_allclose(disc_probabilities(offsets, which, covs, 1.5), whole, rtol=0.0, atol=1e-15)
 
 

@@ -10,7 +10,7 @@ import pytest
 from evaluation.synthetic import make_record
 from simulation.test_explanation_tables import explanation_of
 from vedette.control import Bound, RunnerUp
-from vedette.evaluation.certainty import lead_words, optimality_words
+from vedette.evaluation.actions import lead_words, optimality_words
 
 
 @pytest.mark.parametrize(

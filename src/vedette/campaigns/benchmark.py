@@ -90,17 +90,11 @@ def scenes() -> dict[str, Scene]:
 
 @dataclass(frozen=True, slots=True)
 class Entrant:
-    """A planner or tracker entered into the benchmark.
+    """A planner or tracker entered into the benchmark."""
 
-    Attributes:
-        name: name of the entrant and of its folders.
-        role: planner or tracker.
-        section: its section in a scenario.
-    """
-
-    name: str
-    role: Role
-    section: dict[str, Any]
+    name: str  # name of the entrant and of its folders
+    role: Role  # planner or tracker
+    section: dict[str, Any]  # its section in a scenario
 
 
 def entrant(role: Role, text: str, *, seconds: float, folder: Path) -> Entrant:

@@ -29,54 +29,34 @@ _SAYS_NOTHING = 1e-6
 
 @dataclass(frozen=True, slots=True)
 class LeaderboardRow:
-    """Result of one strategy on a scene, over all attempted runs. A lost run counts with the cutoff as its error.
+    """Result of one strategy on a scene, over all attempted runs. A lost run counts with the cutoff as its error."""
 
-    Attributes:
-        label: name of the strategy.
-        is_own: whether it is one of the library's own strategies.
-        num_runs, num_lost: number of runs, and of those that could not be finished.
-        ospa: mean over scans and runs, with its 95 % interval.
-        tail: median and worst run of the same, and the share of runs that end with a lost target.
-        difference: paired difference in OSPA to the first strategy. None: it is the first.
-        cardinality_error: mean number of estimates minus that of targets. NaN: no run was finished.
-        nees: mean NEES of positions over 2, with its interval: 1 if covariances are consistent. None: estimates have no
-            covariances.
-        seconds: median wall time of a decision, or of the filters and fusion of a scan, s, also of a program.
-        counts: mean number per decision of each of `COUNTED`. NaN: not known.
-        reason: reason why the first lost run was lost.
-    """
-
-    label: str
-    is_own: bool
-    num_runs: int
+    label: str  # name of the strategy
+    is_own: bool  # whether it is one of the library's own strategies
+    num_runs: int  # number of runs, and of those that could not be finished
     num_lost: int
-    ospa: Summary
-    tail: TailSummary
-    difference: Summary | None
-    cardinality_error: float
+    ospa: Summary  # mean over scans and runs, with its 95 % interval
+    tail: TailSummary  # median and worst run of the same, and the share of runs that end with a lost target
+    difference: Summary | None  # paired difference in OSPA to the first strategy. None: it is the first
+    cardinality_error: float  # mean number of estimates minus that of targets. NaN: no run was finished
+    # mean NEES of positions over 2, with its interval: 1 if covariances are consistent. None: estimates have no
+    # covariances
     nees: Summary | None
-    seconds: float
-    counts: Mapping[str, float]
-    reason: str
+    seconds: float  # median wall time of a decision, or of the filters and fusion of a scan, s, also of a program
+    counts: Mapping[str, float]  # mean number per decision of each of `COUNTED`. NaN: not known
+    reason: str  # reason why the first lost run was lost
 
 
 @dataclass(frozen=True, slots=True)
 class SceneTable:
-    """All strategies on a scene, the reference first.
+    """All strategies on a scene, the reference first."""
 
-    Attributes:
-        scene: the scene.
-        unit: unit of OSPA.
-        digest: SHA-256 of the scenario without the entrants.
-        entrants: SHA-256 of the campaign of each entrant, by folder: scene, command and the files that it names.
-        standings: row of each strategy.
-    """
-
-    scene: Scene
-    unit: str
-    digest: str
+    scene: Scene  # the scene
+    unit: str  # unit of OSPA
+    digest: str  # SHA-256 of the scenario without the entrants
+    # SHA-256 of the campaign of each entrant, by folder: scene, command and the files that it names
     entrants: Mapping[str, str]
-    standings: tuple[LeaderboardRow, ...]
+    standings: tuple[LeaderboardRow, ...]  # row of each strategy
 
 
 def scene_table(scene: Scene, folder: Path) -> SceneTable | None:

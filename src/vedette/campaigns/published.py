@@ -47,23 +47,14 @@ class CheckedClaim(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class PublishedComparison:
-    """A campaign on a published scene, with the published figures.
+    """A campaign on a published scene, with the published figures."""
 
-    Attributes:
-        spec: specification of the campaign, which has the name of the comparison.
-        title: topic in one line.
-        source: source of the published figures, empty if there are none.
-        remark: differences between the published figures and those of the campaign.
-        published: published methods, the best first.
-        claims, decisions: other published statements: orders of strategies, and actions.
-    """
-
-    spec: CampaignSpec
-    title: str
-    source: str
-    remark: str
-    published: tuple[StrategyScore, ...]
-    claims: tuple[PublishedOrder, ...] = ()
+    spec: CampaignSpec  # specification of the campaign, which has the name of the comparison
+    title: str  # topic in one line
+    source: str  # source of the published figures, empty if there are none
+    remark: str  # differences between the published figures and those of the campaign
+    published: tuple[StrategyScore, ...]  # published methods, the best first
+    claims: tuple[PublishedOrder, ...] = ()  # other published statements: orders of strategies, and actions
     decisions: tuple[PublishedDecision, ...] = ()
 
 

@@ -37,19 +37,12 @@ _TOGETHER = 500  # runs per part of the tables
 
 @dataclass(frozen=True, slots=True)
 class GroupComparison:
-    """Comparison of cells that differ only in the compared axis.
+    """Comparison of cells that differ only in the compared axis."""
 
-    Attributes:
-        settings: values of the other axes, which the cells share.
-        cells: in the order of the comparison's strategies.
-        labels: values of the compared axis as text, the names of the comparison's strategies.
-        comparison: over the runs that are finished in every cell, and the scans that the scenario counts.
-    """
-
-    settings: dict[str, Any]
-    cells: tuple[Cell, ...]
-    labels: tuple[str, ...]
-    comparison: Comparison
+    settings: dict[str, Any]  # values of the other axes, which the cells share
+    cells: tuple[Cell, ...]  # in the order of the comparison's strategies
+    labels: tuple[str, ...]  # values of the compared axis as text, the names of the comparison's strategies
+    comparison: Comparison  # over the runs that are finished in every cell, and the scans that the scenario counts
 
 
 @dataclass(frozen=True, slots=True, repr=False)

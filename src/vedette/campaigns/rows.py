@@ -52,19 +52,13 @@ def unpack(packed: bytes, max_bytes: int = MOST_BYTES) -> bytes:
 
 @dataclass(frozen=True, slots=True)
 class Row:
-    """A finished run to store.
+    """A finished run to store."""
 
-    Attributes:
-        cell, run: identify the run.
-        payload, timings: the run, and its timings.
-        metrics: metrics of the run, empty before packing if there are none, as they can be computed later.
-    """
-
-    cell: str
-    run: int
-    payload: Packed
-    metrics: Packed
-    timings: Packed
+    cell: str  # identify the run
+    run: int  # identify the run
+    payload: Packed  # the run, and its timings
+    metrics: Packed  # metrics of the run, empty before packing if there are none, as they can be computed later
+    timings: Packed  # the run, and its timings
 
     def values(self, session: int) -> tuple[Any, ...]:
         """Return the values for the columns of the store."""
@@ -78,20 +72,14 @@ def row_of(cell: str, run: int, payload: bytes, timings: bytes, metrics: bytes =
 
 @dataclass(frozen=True, slots=True)
 class Entry:
-    """A finished run read from the store.
+    """A finished run read from the store."""
 
-    Attributes:
-        cell, run: identify the run.
-        session: number, from 1, of the session that stored it.
-        payload, metrics, timings: as in `Row`, unpacked.
-    """
-
-    cell: str
-    run: int
-    session: int
-    payload: bytes
-    metrics: bytes
-    timings: bytes
+    cell: str  # identify the run
+    run: int  # identify the run
+    session: int  # number, from 1, of the session that stored it
+    payload: bytes  # as in `Row`, unpacked
+    metrics: bytes  # as in `Row`, unpacked
+    timings: bytes  # as in `Row`, unpacked
 
     @property
     def checksum(self) -> str:

@@ -15,30 +15,20 @@ _LEAST_SECONDS = 1e-4
 
 @dataclass(frozen=True, slots=True)
 class StrategyScore:
-    """Score of one strategy over the paired runs of a setting, or of a published method.
+    """Score of one strategy over the paired runs of a setting, or of a published method."""
 
-    Attributes:
-        label: name of the strategy.
-        ospa: mean over scans and runs, in the unit of the comparison.
-        standard_error: standard error of `ospa` over the runs. None: not known.
-        worst: largest mean over the scans of a run. None: not known.
-        difference: paired difference to the first strategy. None: it is the first, or not paired with it.
-        cardinality_error: mean number of estimates minus that of targets.
-        tracked: mean share of all targets, in view or not, with an estimate within the cutoff. None: not measured.
-        decision_seconds: wall time of a decision of all sensors, s: median over decisions and runs, and for a published
-            method the published value. None: no decisions.
-        num_runs: number of runs.
-    """
-
-    label: str
-    ospa: float
-    standard_error: float | None
-    worst: float | None
-    difference: Summary | None
-    cardinality_error: float
+    label: str  # name of the strategy
+    ospa: float  # mean over scans and runs, in the unit of the comparison
+    standard_error: float | None  # standard error of `ospa` over the runs. None: not known
+    worst: float | None  # largest mean over the scans of a run. None: not known
+    difference: Summary | None  # paired difference to the first strategy. None: it is the first, or not paired with it
+    cardinality_error: float  # mean number of estimates minus that of targets
+    # mean share of all targets, in view or not, with an estimate within the cutoff. None: not measured
     tracked: float | None
+    # wall time of a decision of all sensors, s: median over decisions and runs, and for a published method the
+    # published value. None: no decisions
     decision_seconds: float | None
-    num_runs: int
+    num_runs: int  # number of runs
 
 
 def score_strategies(group: GroupComparison) -> tuple[StrategyScore, ...]:

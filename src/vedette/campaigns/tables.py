@@ -32,21 +32,13 @@ _ANY = Layout({"sha256": Kind.TEXT}, {"": Kind.NUMBER})
 
 @dataclass(frozen=True, slots=True)
 class FinishedRun:
-    """One run of a campaign.
+    """One run of a campaign."""
 
-    Attributes:
-        cell: name of its cell.
-        record: the record, including timings.
-        metrics: metrics of its estimates.
-        session: number, from 1, of the session in the manifest's list that stored it.
-        checksum: SHA-256 of everything except timings, equal for equal results.
-    """
-
-    cell: str
-    record: RunRecord
-    metrics: RunMetrics
-    session: int
-    checksum: str
+    cell: str  # name of its cell
+    record: RunRecord  # the record, including timings
+    metrics: RunMetrics  # metrics of its estimates
+    session: int  # number, from 1, of the session in the manifest's list that stored it
+    checksum: str  # SHA-256 of everything except timings, equal for equal results
 
 
 def tables_of_record(record: RunRecord) -> dict[str, pa.Table]:

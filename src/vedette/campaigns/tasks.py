@@ -25,16 +25,12 @@ _HANDED_OUT_SECONDS = 0.005  # upper estimate of the time to hand out a task
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Task:
-    """Some runs of one cell.
+    """Some runs of one cell."""
 
-    Attributes:
-        cell, seed, runs: what to run.
-        versions: versions of the packages that determine the bytes of a result. A worker with other versions refuses.
-    """
-
-    cell: Cell
+    cell: Cell  # what to run
     seed: int
     runs: tuple[int, ...]
+    # versions of the packages that determine the bytes of a result. A worker with other versions refuses
     versions: Mapping[str, str]
 
     def alone(self) -> "Iterator[Task]":

@@ -57,8 +57,7 @@ def _title(record: RunRecord, scenario: Scenario | None) -> str:
 def _print_decisions(console: Console, record: RunRecord) -> None:
     from rich.table import Table
 
-    from vedette.evaluation.actions import describe_choice
-    from vedette.evaluation.certainty import lead_words, optimality_words
+    from vedette.evaluation.actions import describe_choice, lead_words, optimality_words
     from vedette.evaluation.comparison import decided_actions
 
     rows = list(zip(record.decisions, decided_actions(record), strict=True))

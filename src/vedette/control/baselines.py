@@ -114,9 +114,6 @@ class ConstraintReportingPlanner:
         sensors: the sensors that it steers.
         settings: the horizon, over which courses are tested.
         constraints: the constraints that are tested.
-
-    Raises:
-        InputError: parts of another type.
     """
 
     planner: Planner

@@ -11,9 +11,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from vedette.control.camera_turning import seconds_to_search, seconds_to_turn, turn_rate
 from vedette.control.constraints.paths import Paths, VisibilityGraph
-from vedette.control.extrapolation import extrapolated, walked
+from vedette.control.extrapolation import extrapolated, seconds_to_search, seconds_to_turn, turn_rate, walked
 from vedette.control.settings import MobileSensor, PlanningSettings
 from vedette.densities import LMB, UndetectedIntensity
 from vedette.kernels.base.types import HALF_WIDTH, HEADING, Bools, Floats, Ints
@@ -37,23 +36,14 @@ _SAME_HEADING = 1e-12  # 1 minus the cosine of two headings that are taken for o
 
 @dataclass(frozen=True, slots=True, eq=False)
 class CostToGo:
-    """Targets that attract sensors, how long sensors take to reach them, and how courses continue towards them.
+    """Targets that attract sensors, how long sensors take to reach them, and how courses continue towards them."""
 
-    Attributes:
-        options: for each sensor, its options within the horizon.
-        reaches: (num_sensors,) m, detection range of each sensor.
-        labels: (num_targets, 2) labels of the targets that attract sensors.
-        places: (num_targets, 2) m, expected positions of these targets.
-        paths: for each sensor, its paths to these positions.
-        undetected: intensity of undetected targets; None: not known.
-    """
-
-    options: tuple[Options, ...]
-    reaches: Floats
-    labels: Ints
-    places: Floats
-    paths: tuple[Paths, ...]
-    undetected: UndetectedIntensity | None
+    options: tuple[Options, ...]  # for each sensor, its options within the horizon
+    reaches: Floats  # (num_sensors,) m, detection range of each sensor
+    labels: Ints  # (num_targets, 2) labels of the targets that attract sensors
+    places: Floats  # (num_targets, 2) m, expected positions of these targets
+    paths: tuple[Paths, ...]  # for each sensor, its paths to these positions
+    undetected: UndetectedIntensity | None  # intensity of undetected targets; None: not known
 
     @classmethod
     def of(

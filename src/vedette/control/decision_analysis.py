@@ -25,17 +25,11 @@ _SAME_NUMBER = 1e-6
 
 @dataclass(frozen=True, eq=False)
 class DecisionAnalysis:
-    """A decision with its evidence, which can be analysed. Neither copied nor pickled: a copy is None.
+    """A decision with its evidence, which can be analysed. Neither copied nor pickled: a copy is None."""
 
-    Attributes:
-        planner: name of the planner.
-        parts: the decisions made as units. The reward is the sum of theirs.
-        bound: of the plan.
-    """
-
-    planner: str
-    parts: tuple[Part, ...]
-    bound: Bound | None = field(default=None)
+    planner: str  # name of the planner
+    parts: tuple[Part, ...]  # the decisions made as units. The reward is the sum of theirs
+    bound: Bound | None = field(default=None)  # of the plan
 
     def __reduce__(self) -> Any:
         return type(None), ()

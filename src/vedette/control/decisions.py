@@ -54,22 +54,14 @@ class Deadline:
 
 @dataclass(slots=True, eq=False)
 class Rounds:
-    """Rounds of fresh samples, with counts over all rounds.
+    """Rounds of fresh samples, with counts over all rounds."""
 
-    Attributes:
-        preparation: of the decision.
-        evaluator: the first evaluator, of all courses, whose counts are those of all rounds.
-        num_samples: number of samples drawn so far.
-        rng: generator of the samples.
-        deadline: of searches and rounds.
-        others: (num_sensors,) courses that sensors which decide alone assume for the others. None: no other sensors.
-    """
-
-    preparation: Preparation
-    evaluator: Evaluator
-    num_samples: int
-    rng: np.random.Generator
-    deadline: Deadline
+    preparation: Preparation  # of the decision
+    evaluator: Evaluator  # the first evaluator, of all courses, whose counts are those of all rounds
+    num_samples: int  # number of samples drawn so far
+    rng: np.random.Generator  # generator of the samples
+    deadline: Deadline  # of searches and rounds
+    # (num_sensors,) courses that sensors which decide alone assume for the others. None: no other sensors
     others: tuple[int, ...] | None = None
 
     @classmethod

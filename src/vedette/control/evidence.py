@@ -28,27 +28,18 @@ _BLOCK = 4_000_000
 
 @dataclass(slots=True, eq=False)
 class Evidence:
-    """Mean rewards of the joint actions of some sensors: every one that was evaluated.
+    """Mean rewards of the joint actions of some sensors: every one that was evaluated."""
 
-    Attributes:
-        evaluator: source of the rewards.
-        which: the sensors.
-        rewards: function that returns their sample rewards.
-        shape: number of distinct courses of each of the sensors.
-        keeps: whether `evaluate` keeps the rewards of all samples.
-        upper_limit: cached result of `vedette.control.problem.upper_limit`.
-    """
-
-    evaluator: Evaluator
-    which: tuple[int, ...]
-    rewards: SampleRewards
-    keeps: bool = False
-    shape: tuple[int, ...] = field(init=False)
+    evaluator: Evaluator  # source of the rewards
+    which: tuple[int, ...]  # the sensors
+    rewards: SampleRewards  # function that returns their sample rewards
+    keeps: bool = False  # whether `evaluate` keeps the rewards of all samples
+    shape: tuple[int, ...] = field(init=False)  # number of distinct courses of each of the sensors
     _noted: list[tuple[Ints, Floats, Floats]] = field(default_factory=list)  # joint actions, means, errors
     _samples: list[tuple[Ints, Floats]] = field(default_factory=list)
     _evaluations: list[int] = field(default_factory=list)
     _best: list[float] = field(default_factory=list)
-    upper_limit: list[Bound] = field(default_factory=list)
+    upper_limit: list[Bound] = field(default_factory=list)  # cached result of `vedette.control.problem.upper_limit`
     _is_complete: bool = False
 
     def __post_init__(self) -> None:

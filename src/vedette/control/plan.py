@@ -163,13 +163,11 @@ class Plan(TabularRepr):
 
         A number that a sensor's actions do not have is None.
         """
-        chosen = [dict(zip(own.columns, row, strict=True)) for own, row in zip(self.actions, self._rows(), strict=True)]
+        rows = zip(self.actions, self.chosen_actions, strict=True)
+        chosen = [dict(zip(own.columns, row.tolist(), strict=True)) for own, row in rows]
         table: dict[str, list[Any]] = {"sensor": list(range(self.num_sensors)), "action": list(self.chosen)}
         table["num_actions"] = [len(own) for own in self.actions]
         return table | {name: [row.get(name) for row in chosen] for name in dict.fromkeys(n for r in chosen for n in r)}
-
-    def _rows(self) -> list[list[float]]:
-        return [row.tolist() for row in self.chosen_actions]
 
     def _summary(self) -> str:
         rewards = self.expected_rewards

@@ -32,9 +32,6 @@ class JointPlanner:
         search: which joint actions are evaluated: all of them, as in the paper, or fewer.
         constraints: limits on the sensors' courses.
         notes: notes that every plan repeats, such as that the tracks are fused in another way.
-
-    Raises:
-        InputError: parts of another type.
     """
 
     sensors: tuple[MobileSensor, ...]
@@ -85,9 +82,6 @@ class IndependentPlanner:
         others: what each sensor assumes about the others. "stay": they continue as they are, on the course that changes
             their pose least (`vedette.control.inputs.stationary_courses`), and the reward is that of all scans
             together. "absent", as in the paper: there are none, and the reward is that of its own update alone.
-
-    Raises:
-        InputError: parts of another type, or another assumption.
     """
 
     sensors: tuple[MobileSensor, ...]

@@ -1,14 +1,21 @@
-"""The fused density predicted to the end of the horizon, the starting point of every decision."""
+"""The fused density over the horizon of a decision: its prediction, and samples with their trajectories."""
 
+from collections.abc import Sequence
 from typing import NamedTuple, TypeVar
 
-from vedette.densities import LMB, LabelledDensity, track_moments
+import numpy as np
+
+from vedette.control.settings import Belief, MobileSensor, PlanningSettings
+from vedette.densities import LMB, LabelledDensity, MultiTargetSamples, track_moments
 from vedette.densities.containers import for_kernel, unchecked
 from vedette.densities.conversions import with_single_gaussians
 from vedette.densities.label_sets import without_zero_weights
-from vedette.densities.tracks import gaussian_tracks, single_gaussians
+from vedette.densities.samples import sample_labelled
+from vedette.densities.tracks import gaussian_tracks, places_of, single_gaussians
+from vedette.filters import common_target_model
 from vedette.filters.inputs import model_errors
-from vedette.kernels.base.types import Lmb
+from vedette.kernels.base.types import Floats, Ints, Lmb
+from vedette.kernels.planning.ideal import propagate_samples
 from vedette.kernels.planning.reach import Paths, predict_paths
 from vedette.models import MotionModel, constant_survival, kernel_motion
 
@@ -48,3 +55,27 @@ def predicted(fused: _Labelled, motion: MotionModel, num_steps: int, period: flo
         paths = predict_paths(kernel_motion(motion, ALWAYS_SURVIVES), float(period), int(num_steps), means, covs)
     tracks = gaussian_tracks(single.tracks.labels, paths.means[:, -1], paths.covs[:, -1])
     return single.with_fields(tracks=tracks)
+
+
+def draw_paths(
+    fused: Belief, sensors: Sequence[MobileSensor], settings: PlanningSettings, *, rng: np.random.Generator
+) -> tuple[MultiTargetSamples, Floats]:
+    """Return samples of the fused density, and their noise-free states (horizon_steps, num_targets, state_dim)."""
+    targets = common_target_model([sensor.filter for sensor in sensors])
+    samples = sample_labelled(fused, settings.num_samples, rng=rng)
+    with model_errors():
+        motion = kernel_motion(targets.motion, targets.survival)
+        states = propagate_samples(motion, samples.states, float(settings.horizon_period), int(settings.horizon_steps))
+    return samples, states
+
+
+def targets_of(table: Ints, labels: Ints, offsets: Ints) -> Ints:
+    """Return (num_labels, num_samples) the index of the target of each label of `table` in each sample, -1 if absent.
+
+    labels: of the sampled targets, which are `offsets[i]:offsets[i + 1]` of sample i.
+    """
+    rows = places_of(labels, table)
+    of_sample = np.repeat(np.arange(len(offsets) - 1), np.diff(offsets))
+    targets, exists = np.full((len(table), len(offsets) - 1), -1), rows >= 0
+    targets[rows[exists], of_sample[exists]] = np.flatnonzero(exists)
+    return targets

@@ -55,23 +55,15 @@ class PlanningBeliefs(NamedTuple):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Preparation:
-    """The prepared inputs of one decision, which makes evaluators on fresh samples.
+    """The prepared inputs of one decision, which makes evaluators on fresh samples."""
 
-    Attributes:
-        sensors, settings, reward: as in the planners.
-        planned: beliefs and fusion in the form that they are planned on.
-        options: for each sensor.
-        mask: feasible joint actions. None: all.
-        graph: of the zones that constraints forbid.
-    """
-
-    sensors: tuple[MobileSensor, ...]
-    settings: PlanningSettings
-    reward: AnyReward
-    planned: PlanningBeliefs
-    options: tuple[Options, ...]
-    mask: Mask | None
-    graph: VisibilityGraph
+    sensors: tuple[MobileSensor, ...]  # as in the planners
+    settings: PlanningSettings  # as in the planners
+    reward: AnyReward  # as in the planners
+    planned: PlanningBeliefs  # beliefs and fusion in the form that they are planned on
+    options: tuple[Options, ...]  # for each sensor
+    mask: Mask | None  # feasible joint actions. None: all
+    graph: VisibilityGraph  # of the zones that constraints forbid
 
     @classmethod
     def of(

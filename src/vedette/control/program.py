@@ -39,9 +39,6 @@ class ProgramPlanner:
         folder: working directory of the program.
         seconds: time limit for an answer.
         start_seconds: time limit for its first answer, that it is ready.
-
-    Raises:
-        InputError: parts of another type.
     """
 
     sensors: tuple[MobileSensor, ...]

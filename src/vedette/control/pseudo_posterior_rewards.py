@@ -39,28 +39,18 @@ SLOWER_BY = "a joint decision of two sensors takes 40 to 70 times as long, an in
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PseudoPosteriorRewards:
-    """Rewards from the sensors' own filters, whose pseudo-updates are run once, in `prepare`.
+    """Rewards from the sensors' own filters, whose pseudo-updates are run once, in `prepare`."""
 
-    Attributes:
-        sensors, fusion, settings, reward: as in the planners.
-        options: for each sensor.
-        prediction: the fused density predicted to the horizon, one Gaussian per track.
-        posteriors: the pseudo-posteriors of each sensor.
-        scanned: for each sensor (num_courses,) whether it scans within the horizon.
-        counts: numbers of filter steps, fusions and divergences evaluated so far.
-        notes: notes for readers of the decision, in order of occurrence (keys, whose values are unused).
-    """
-
-    sensors: tuple[MobileSensor, ...]
-    fusion: Fusion
-    settings: PlanningSettings
-    reward: Reward | PowerReward | LabelReward
-    options: tuple[Options, ...]
-    prediction: Belief
-    posteriors: tuple[DensityBatch, ...]
-    scanned: tuple[Bools, ...]
-    counts: dict[str, int]
-    notes: dict[str, None]
+    sensors: tuple[MobileSensor, ...]  # as in the planners
+    fusion: Fusion  # as in the planners
+    settings: PlanningSettings  # as in the planners
+    reward: Reward | PowerReward | LabelReward  # as in the planners
+    options: tuple[Options, ...]  # for each sensor
+    prediction: Belief  # the fused density predicted to the horizon, one Gaussian per track
+    posteriors: tuple[DensityBatch, ...]  # the pseudo-posteriors of each sensor
+    scanned: tuple[Bools, ...]  # for each sensor (num_courses,) whether it scans within the horizon
+    counts: dict[str, int]  # numbers of filter steps, fusions and divergences evaluated so far
+    notes: dict[str, None]  # notes for readers of the decision, in order of occurrence (keys, whose values are unused)
 
     @classmethod
     def prepare(
@@ -186,21 +176,14 @@ def warn_slow(reason: str) -> None:
 
 @dataclass(slots=True, eq=False)
 class PlainRewards:
-    """Any reward by `fusion.fuse` and the reward function, one joint action and sample at a time.
+    """Any reward by `fusion.fuse` and the reward function, one joint action and sample at a time."""
 
-    Attributes:
-        posteriors: one for each sensor.
-        prediction: the fused density at the horizon.
-        fusion: None for a single sensor, whose own density is then compared with the prediction.
-        reward, num_samples: as in the planners.
-        views: returns the fields of view at the end of a joint action, which a fusion may need.
-    """
-
-    posteriors: Sequence[DensityBatch]
-    prediction: Belief
-    fusion: Fusion | None
-    reward: Reward | PowerReward | LabelReward
-    num_samples: int
+    posteriors: Sequence[DensityBatch]  # one for each sensor
+    prediction: Belief  # the fused density at the horizon
+    fusion: Fusion | None  # None for a single sensor, whose own density is then compared with the prediction
+    reward: Reward | PowerReward | LabelReward  # as in the planners
+    num_samples: int  # as in the planners
+    # returns the fields of view at the end of a joint action, which a fusion may need
     views: Callable[[Sequence[int]], FieldsOfView]
     _densities: dict[tuple[int, int], Belief] = field(default_factory=dict)
 

@@ -11,7 +11,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from vedette.control.known_models import decision_of
-from vedette.control.sampling import draw_paths, targets_of
+from vedette.control.prediction import draw_paths, targets_of
 from vedette.control.settings import Belief, MobileSensor, PlanningSettings
 from vedette.densities import (
     GLMB,

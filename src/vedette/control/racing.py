@@ -41,23 +41,15 @@ def next_total(num_samples: int, max_samples: int) -> int:
 
 @dataclass(slots=True, eq=False)
 class Race:
-    """Candidates with their rewards so far.
+    """Candidates with their rewards so far."""
 
-    Attributes:
-        actions: (num_candidates, num_sensors) the joint actions at the start, in printed order.
-        confidence, indifference: as in `PlanningSettings`.
-        sensor: the sensor whose actions race. None: joint actions of all sensors, fused.
-        left: (num_left,) rows of `actions` that are not excluded.
-        rewards: (num_left, num_samples) their rewards.
-        excluded: for each round, the rows that it excluded and their rewards until then.
-    """
-
-    actions: Ints
-    confidence: float
-    indifference: float
-    sensor: int | None = None
-    left: Ints = field(init=False)
-    rewards: Floats = field(init=False)
+    actions: Ints  # (num_candidates, num_sensors) the joint actions at the start, in printed order
+    confidence: float  # as in `PlanningSettings`
+    indifference: float  # as in `PlanningSettings`
+    sensor: int | None = None  # the sensor whose actions race. None: joint actions of all sensors, fused
+    left: Ints = field(init=False)  # (num_left,) rows of `actions` that are not excluded
+    rewards: Floats = field(init=False)  # (num_left, num_samples) their rewards
+    # for each round, the rows that it excluded and their rewards until then
     excluded: list[tuple[Ints, Floats]] = field(default_factory=list)
     _round: int = 0
     _best: int = 0

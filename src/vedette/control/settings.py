@@ -80,9 +80,6 @@ class PlanningSettings:
             Every label set of the prior keeps its heaviest hypothesis beyond these caps, and an LMB keeps all its
             labels. Tracks that are mixtures are replaced by one Gaussian of their moments beforehand.
         num_threads: threads that share a decision. 0: one per processor. The result does not depend on it.
-
-    Raises:
-        InputError: a field out of range.
     """
 
     horizon_steps: Count = 5

@@ -28,28 +28,19 @@ class DensityBatch:
 
     Each is a product of factors, and a factor is a weighted list of label sets with a Gaussian for each (set, label): a
     marginalised GLMB has one factor, an LMB one per label, with the sets {} and {l}.
-
-    Attributes:
-        kind: container class of a single case.
-        factors: names of the factors: for an LMB each its label, for a GLMB the single name `()`.
-        factor_offsets: (num_factors + 1,) into `sets`.
-        sets: label sets, factor after factor.
-        log_weights: (num_cases, num_sets) log weight of each set in its factor.
-        means, covs: (num_cases, num_members, ...) one Gaussian for each label of each set, in order, without meaning
-            if a GLMB's set has log weight -inf.
-        num_samples: for planners: case `action * num_samples + sample` is of this action and this sample.
-        num_threads: threads that may share work on the cases. The result does not depend on it.
     """
 
-    kind: type[GLMB] | type[LMB]
-    factors: tuple[LabelSet, ...]
-    factor_offsets: Ints
-    sets: tuple[LabelSet, ...]
-    log_weights: Floats
+    kind: type[GLMB] | type[LMB]  # container class of a single case
+    factors: tuple[LabelSet, ...]  # names of the factors: for an LMB each its label, for a GLMB the single name `()`
+    factor_offsets: Ints  # (num_factors + 1,) into `sets`
+    sets: tuple[LabelSet, ...]  # label sets, factor after factor
+    log_weights: Floats  # (num_cases, num_sets) log weight of each set in its factor
+    # (num_cases, num_members, ...) one Gaussian for each label of each set, in order, without meaning if a GLMB's set
+    # has log weight -inf
     means: Floats
     covs: Floats
-    num_samples: int = 1
-    num_threads: int = 1
+    num_samples: int = 1  # for planners: case `action * num_samples + sample` is of this action and this sample
+    num_threads: int = 1  # threads that may share work on the cases. The result does not depend on it
 
     @classmethod
     def of_glmbs(

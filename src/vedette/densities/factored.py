@@ -42,9 +42,6 @@ class FactoredGLMB(Hypotheses):
         undetected: targets without a label, independent of all others, or None if there are none.
 
     The arrays are copied, checked once at creation, and read-only afterwards.
-
-    Raises:
-        InputError: as `validate`.
     """
 
     tracks: TrackTable

@@ -72,9 +72,6 @@ class GLMB(Hypotheses):
         hyp_log_weights: (num_hyps,) normalised log weights.
 
     The arrays are copied, checked once at creation, and read-only afterwards.
-
-    Raises:
-        InputError: as `validate`.
     """
 
     tracks: TrackTable

@@ -175,13 +175,11 @@ class JoinedFactors(NamedTuple):
 
     Groups are in increasing order of their first labels. Each density is the product of its parts in the groups.
     Factors without labels are in none.
-
-    densities: the densities of the factors. groups: for each density, (num_factors,) the group of each factor, or -1.
-    alone: (num_groups,) True if all factors in the group are of its only label, in the form of `FactoredGLMB.of`.
     """
 
-    densities: tuple[FactoredGLMB, ...]
-    groups: tuple[Ints, ...]
+    densities: tuple[FactoredGLMB, ...]  # the densities of the factors
+    groups: tuple[Ints, ...]  # for each density, (num_factors,) the group of each factor, or -1
+    # (num_groups,) True if all factors in the group are of its only label, in the form of `FactoredGLMB.of`
     alone: Bools
 
     def lmbs_alone(self) -> list[LMB]:

@@ -188,9 +188,6 @@ class LMB(LabelledDensity):
             -inf and inf.
 
     The arrays are copied, checked once at creation, and read-only afterwards.
-
-    Raises:
-        InputError: as `validate`.
     """
 
     tracks: TrackTable

@@ -32,9 +32,6 @@ class MultiBernoulli(Unlabelled):
         marks: optional columns of the components, such as log probabilities of classes.
 
     The arrays are copied, checked once at creation, and read-only afterwards.
-
-    Raises:
-        InputError: as `validate`.
     """
 
     existence_logit: Floats

@@ -35,28 +35,18 @@ class SensorPower(NamedTuple):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PowerProducts:
-    """A prediction and the cases of some sensors, prepared for the power integrals of any of their products.
+    """A prediction and the cases of some sensors, prepared for the power integrals of any of their products."""
 
-    Attributes:
-        laid: the cases, concatenated over the sensors.
-        log_weights, log_dets: (num_sets,), (num_members,) log weights of the prediction and of the determinants of its
-            covariances.
-        rows: (num_members, row_size) its information rows.
-        sensors: columns of a joint action whose sensors take part.
-        first_cases: the first case of each of these sensors.
-        num_samples, num_threads: as in the cases.
-        state_dim: length of a target's state.
-    """
-
-    laid: PreparedCases
+    laid: PreparedCases  # the cases, concatenated over the sensors
+    # (num_sets,), (num_members,) log weights of the prediction and of the determinants of its covariances
     log_weights: Floats
     log_dets: Floats
-    rows: Floats
-    sensors: Ints
-    first_cases: Ints
-    num_samples: int
-    num_threads: int
-    state_dim: int
+    rows: Floats  # (num_members, row_size) its information rows
+    sensors: Ints  # columns of a joint action whose sensors take part
+    first_cases: Ints  # the first case of each of these sensors
+    num_samples: int  # as in the cases
+    num_threads: int  # as in the cases
+    state_dim: int  # length of a target's state
 
     def z(self, actions: Ints, exponents: Sequence[tuple[float, float]], unit_volume: float = 1.0) -> Floats:
         """Z(a, b) of joint actions (num_joint, num_sensors), shape (num_joint, num_samples, num_exponents).

@@ -42,9 +42,6 @@ class TrackTable(Components):
             prediction). None for tracks made of several, or by another filter, and if the origin is unknown.
 
     The arrays are copied, checked once at creation, and read-only afterwards.
-
-    Raises:
-        InputError: as `validate`.
     """
 
     labels: Ints

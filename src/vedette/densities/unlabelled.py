@@ -49,9 +49,6 @@ class Poisson(Unlabelled):
         marks: optional columns of the components, such as log probabilities of classes.
 
     The arrays are copied, checked once at creation, and read-only afterwards.
-
-    Raises:
-        InputError: as `validate`.
     """
 
     log_weights: Floats
@@ -132,9 +129,6 @@ class IidCluster(Unlabelled):
         marks: optional columns of the components, such as log probabilities of classes.
 
     The arrays are copied, checked once at creation, and read-only afterwards.
-
-    Raises:
-        InputError: as `validate`.
     """
 
     log_cardinality: Floats

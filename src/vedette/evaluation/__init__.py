@@ -10,9 +10,8 @@ from vedette.evaluation.metrics.matching import Matching, match_run
 from vedette.evaluation.metrics.point_gospa import GospaResult, GospaSeries, gospa, gospa_distance, gospa_of_run
 from vedette.evaluation.metrics.point_ospa import OspaResult, ospa, ospa_of_run
 from vedette.evaluation.metrics.run import Metric, RunMetrics, measure
-from vedette.evaluation.metrics.time_to_track import TimeToTrack
 from vedette.evaluation.metrics.track_ospa import TrackSet, ospa2, ospa2_of_run
-from vedette.evaluation.metrics.tracked_fraction import TrackedFraction, targets_in_view
+from vedette.evaluation.metrics.tracked_fraction import TimeToTrack, TrackedFraction, targets_in_view
 from vedette.evaluation.metrics.trajectories import Continuity, continuity, continuity_of_run
 from vedette.evaluation.rewards import MeanRewards, mean_rewards
 from vedette.evaluation.runs import custom_metrics, measure_run, run_scenario, track_recording

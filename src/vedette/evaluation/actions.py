@@ -1,10 +1,12 @@
-"""Actions in words, and as an axis of a figure."""
+"""Actions and the certainty of decisions in words, and actions as an axis of a figure."""
 
+import math
 from collections.abc import Mapping, Sequence
 from typing import NamedTuple, TypeAlias
 
 import numpy as np
 
+from vedette.control.plan import Plan
 from vedette.internal.text import with_minus
 from vedette.kernels.base.types import Floats
 from vedette.platforms import Actions
@@ -19,19 +21,14 @@ _AZIMUTHS = ("course_deg", "azimuth_deg")
 
 
 class ActionAxis(NamedTuple):
-    """The actions of a sensor along an axis.
+    """The actions of a sensor along an axis."""
 
-    name: of the axis: `heading`, or the names of all columns. unit: `deg`, or empty. places: (num_actions,) position of
-    each action. ticks: the numbers alone. labels: in words. is_numeric: True if places are the numbers of a column.
-    Otherwise they count actions from 1.
-    """
-
-    name: str
-    unit: str
-    places: Floats
-    ticks: tuple[str, ...]
-    labels: tuple[str, ...]
-    is_numeric: bool
+    name: str  # of the axis: `heading`, or the names of all columns
+    unit: str  # `deg`, or empty
+    places: Floats  # (num_actions,) position of each action
+    ticks: tuple[str, ...]  # the numbers alone
+    labels: tuple[str, ...]  # in words
+    is_numeric: bool  # True if places are the numbers of a column. Otherwise they count actions from 1
 
     def title(self, sensor: str = "") -> str:
         """Return the title `Heading (deg)`, or for a named sensor `Heading of sensor 1 (deg)`."""
@@ -117,3 +114,24 @@ def _split_column(column: str) -> tuple[str, str, str]:
     end = next(filter(column.endswith, _UNITS), "")
     name = column.removesuffix(end).replace("_", " ")
     return (name, *_UNITS[end]) if end else (name, "", "")
+
+
+def lead_words(plan: Plan) -> str:
+    """Return the lead in mean reward over the runner-up, `0.071 (3.3 std. errors)`, empty if it is not recorded."""
+    runner_up = None if plan.explanation is None else plan.explanation.runner_up
+    if runner_up is None:
+        return ""
+    ratio = runner_up.in_standard_errors
+    if ratio is None or not math.isfinite(ratio):
+        return f"{runner_up.margin:.3g}"
+    return f"{runner_up.margin:.3g} ({ratio:.2g} std. errors)"
+
+
+def optimality_words(plan: Plan) -> str:
+    """Return `yes` for a proven optimum, `within 6.1 %` of it, or `not known`, empty for decisions without a bound."""
+    bound = None if plan.explanation is None else plan.explanation.bound
+    if bound is None:
+        return ""
+    if bound.gap <= 0.0:
+        return "yes"
+    return f"within {100.0 * bound.relative:.2g} %" if bound.is_close else "not known"

@@ -25,19 +25,12 @@ _UNLIKELY = 0.01  # probability of so few reported targets
 
 
 class Diagnostic(NamedTuple):
-    """One check of one or more runs.
+    """One check of one or more runs."""
 
-    Attributes:
-        name: what is checked.
-        meaning: what it means, in a sentence.
-        text: the result with its numbers.
-        level: `ok`; `note`: it happened, and rarely costs accuracy; `check`: it may cost accuracy.
-    """
-
-    name: str
-    meaning: str
-    text: str
-    level: Level
+    name: str  # what is checked
+    meaning: str  # what it means, in a sentence
+    text: str  # the result with its numbers
+    level: Level  # `ok`; `note`: it happened, and rarely costs accuracy; `check`: it may cost accuracy
 
 
 def run_diagnostics(health: Health, sensors: Sequence[str] = ()) -> tuple[Diagnostic, ...]:

@@ -42,14 +42,11 @@ _EDGE = 3  # matches at each end of a track, which depend on what was detected
 
 
 class Finding(NamedTuple):
-    """A fault of the assumed model.
+    """A fault of the assumed model."""
 
-    test: name of the test. sensor: its name, or `` for several. text: sentence with the number and the cure.
-    """
-
-    test: str
-    sensor: str
-    text: str
+    test: str  # name of the test
+    sensor: str  # its name, or `` for several
+    text: str  # sentence with the number and the cure
 
 
 class Fit(NamedTuple):

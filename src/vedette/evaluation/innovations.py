@@ -40,37 +40,26 @@ class Assumed(NamedTuple):
 
 
 class Instant(NamedTuple):
-    """A time of a run at which sensors scanned.
+    """A time of a run at which sensors scanned."""
 
-    time: s. poses: (num_sensors, 3 or more). rows: measurements of each sensor, with the noise that rows bring. None
-    without a scan. estimate: of the targets after these scans.
-    """
-
-    time: float
-    poses: Floats
-    rows: Sequence[ScanLike | None]
-    estimate: Estimate
+    time: float  # s
+    poses: Floats  # (num_sensors, 3 or more)
+    rows: Sequence[ScanLike | None]  # measurements of each sensor, with the noise that rows bring. None without a scan
+    estimate: Estimate  # of the targets after these scans
 
 
 class Matches(NamedTuple):
-    """Tracks at scans of a sensor that should contain them, with no other track near, in order of time.
+    """Tracks at scans of a sensor that should contain them, with no other track near, in order of time."""
 
-    labels: (num, 2). offsets: (num, 2) predicted position relative to the sensor, m. probabilities: (num,) of a
-    detection. numbers: (num,) measurements within the gate. by_chance: (num,) expected number of them that are clutter.
-    innovations: (num, meas_dim) of the only measurement inside, NaN if there is not exactly one. variances: of them.
-    whitened: innovations in units of their standard deviations, without correlations (by Cholesky factors). noise:
-    (num, meas_dim) variances of the noise alone.
-    """
-
-    labels: Ints
-    offsets: Floats
-    probabilities: Floats
-    numbers: Ints
-    by_chance: Floats
-    innovations: Floats
-    variances: Floats
-    whitened: Floats
-    noise: Floats
+    labels: Ints  # (num, 2)
+    offsets: Floats  # (num, 2) predicted position relative to the sensor, m
+    probabilities: Floats  # (num,) of a detection
+    numbers: Ints  # (num,) measurements within the gate
+    by_chance: Floats  # (num,) expected number of them that are clutter
+    innovations: Floats  # (num, meas_dim) of the only measurement inside, NaN if there is not exactly one
+    variances: Floats  # of them
+    whitened: Floats  # innovations in units of their standard deviations, without correlations (by Cholesky factors)
+    noise: Floats  # (num, meas_dim) variances of the noise alone
 
     @classmethod
     def none(cls, dim: int) -> Matches:
@@ -86,18 +75,14 @@ class Matches(NamedTuple):
 
 
 class SensorFit(NamedTuple):
-    """Measurements of a sensor, compared with what its model expects.
+    """Measurements of a sensor, compared with what its model expects."""
 
-    counts: (num_scans,) measurements in the gate of no track, in the scans that were looked at. pose: at the last of
-    these. further: (num_scans, 2) measurements in gates above one for each group of near tracks, and these groups.
-    matches: tracks at these scans. unexplained: (num, 2) positions relative to the sensor, m, of measurements in the
-    gate of no track, with NaN for sensors that measure no positions.
-    """
-
-    counts: Ints
-    pose: Floats
-    further: Floats
-    matches: Matches
+    counts: Ints  # (num_scans,) measurements in the gate of no track, in the scans that were looked at
+    pose: Floats  # at the last of these
+    further: Floats  # (num_scans, 2) measurements in gates above one for each group of near tracks, and these groups
+    matches: Matches  # tracks at these scans
+    # (num, 2) positions relative to the sensor, m, of measurements in the gate of no track, with NaN for sensors that
+    # measure no positions
     unexplained: Floats
 
     @property
@@ -107,19 +92,16 @@ class SensorFit(NamedTuple):
 
 
 class Compared(NamedTuple):
-    """An instant, compared with the tracks as predicted from the instant before.
+    """An instant, compared with the tracks as predicted from the instant before."""
 
-    time: s. own: (num_sensors, 2) positions of the sensors, m. labels: (n, 2) of the tracks. means: (n, 2) their
-    positions, m. detected: (n, num_sensors) 1 if a measurement lies in the gate, 0 if none does although one should, -1
-    for no scan, or a track out of view. fits: of the sensors. None without a scan.
-    """
-
-    time: float
-    own: Floats
-    labels: Ints
-    means: Floats
+    time: float  # s
+    own: Floats  # (num_sensors, 2) positions of the sensors, m
+    labels: Ints  # (n, 2) of the tracks
+    means: Floats  # (n, 2) their positions, m
+    # (n, num_sensors) 1 if a measurement lies in the gate, 0 if none does although one should, -1 for no scan, or a
+    # track out of view
     detected: Ints
-    fits: tuple[SensorFit | None, ...]
+    fits: tuple[SensorFit | None, ...]  # of the sensors. None without a scan
 
 
 def joined(fits: Iterable[SensorFit]) -> SensorFit:

@@ -25,26 +25,19 @@ _MIN_ESTIMATES, _SHAPE = 3, 0.5
 class ObservationHistory:
     """Models of the targets, and the scans that observed them.
 
-    Attributes:
-        targets: motion, survival and births, as in the filters, with births at sites or anywhere in a region.
-        sensors: model of each sensor.
-        times: (num_scans,) of the scans, s.
-        poses: (num_scans, num_sensors, 3 or more) of the sensors.
-        scanned: (num_scans, num_sensors) True if the sensor scanned.
-        prob_hidden: probability that an existing target that is not detected for a while is out of sight, although the
-            detection models do not include it: behind an island, or silent. After n scans it then reappears with
-            probability 1 / n. 0: scans miss a target independently, as filters assume, and 12 misses at a probability
-            of detection of .95 are next to impossible.
-
     Raises:
         InputError: arrays of other shapes, no probability, or births from measurements without a region.
     """
 
-    targets: TargetModel
-    sensors: tuple[SensorModel, ...]
-    times: Floats
-    poses: Floats
-    scanned: Bools
+    targets: TargetModel  # motion, survival and births, as in the filters, with births at sites or anywhere in a region
+    sensors: tuple[SensorModel, ...]  # model of each sensor
+    times: Floats  # (num_scans,) of the scans, s
+    poses: Floats  # (num_scans, num_sensors, 3 or more) of the sensors
+    scanned: Bools  # (num_scans, num_sensors) True if the sensor scanned
+    # probability that an existing target that is not detected for a while is out of sight, although the detection
+    # models do not include it: behind an island, or silent. After n scans it then reappears with probability 1 / n. 0:
+    # scans miss a target independently, as filters assume, and 12 misses at a probability of detection of .95 are next
+    # to impossible
     prob_hidden: float
 
     def __post_init__(self) -> None:

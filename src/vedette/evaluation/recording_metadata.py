@@ -10,15 +10,11 @@ from vedette.simulation.records import RunRecord
 
 
 class RecordingMetadata(NamedTuple):
-    """Clock and names.
+    """Clock and names."""
 
-    start: s, to be added to times of the run. is_utc: True if the sums are seconds since 1970 UTC. names: of the
-    targets, by id, empty if they were not recorded.
-    """
-
-    start: float
-    is_utc: bool
-    names: tuple[str, ...]
+    start: float  # s, to be added to times of the run
+    is_utc: bool  # True if the sums are seconds since 1970 UTC
+    names: tuple[str, ...]  # of the targets, by id, empty if they were not recorded
 
 
 def recording_metadata(record: RunRecord, scenario: Scenario) -> RecordingMetadata:

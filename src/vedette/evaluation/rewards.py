@@ -38,20 +38,15 @@ class MeanRewards:
 
 
 class RewardSums(NamedTuple):
-    """The rewards of one decision, summed over runs: for each entry of a table the mean and the squares about it.
+    """The rewards of one decision, summed over runs: for each entry of a table the mean and the squares about it."""
 
-    first: decision with which the other runs are compared. faults: reasons why there is no mean (the first is
-    reported), or empty. counts, means, squares, chosen: for each table, arrays of its shape. is_absolute,
-    is_relative: True if all runs had the actions of the first, or the same turns from their headings.
-    """
-
-    first: Decision
-    faults: tuple[str, ...]
-    counts: tuple[Floats, ...]
+    first: Decision  # decision with which the other runs are compared
+    faults: tuple[str, ...]  # reasons why there is no mean (the first is reported), or empty
+    counts: tuple[Floats, ...]  # for each table, arrays of its shape
     means: tuple[Floats, ...]
     squares: tuple[Floats, ...]
     chosen: tuple[Floats, ...]
-    is_absolute: bool
+    is_absolute: bool  # True if all runs had the actions of the first, or the same turns from their headings
     is_relative: bool
     num_runs: int
 

@@ -23,17 +23,13 @@ Observation: TypeAlias = dict[str, NDArray[Any]]
 
 
 class DecisionContext(NamedTuple):
-    """A pending decision.
+    """A pending decision."""
 
-    state, poses: the belief, and (num_sensors, 3 or more) poses of the sensors. options: possible actions of each
-    sensor. mask: actions that constraints allow, or None without constraints. observation: what the policy receives.
-    """
-
-    state: State
+    state: State  # the belief, and (num_sensors, 3 or more) poses of the sensors
     poses: Floats
-    options: tuple[Options, ...]
-    mask: Mask | None
-    observation: Observation
+    options: tuple[Options, ...]  # possible actions of each sensor
+    mask: Mask | None  # actions that constraints allow, or None without constraints
+    observation: Observation  # what the policy receives
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -46,9 +42,6 @@ class ObservationEncoder(Checked):
         constraints: constraints on the sensors.
         schedule: times of scans and decisions.
         num_labels: number of targets in an observation, the most probable ones.
-
-    Raises:
-        InputError: `num_labels` that is not a number of at least 1.
     """
 
     sensors: tuple[MobileSensor, ...]

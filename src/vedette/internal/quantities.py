@@ -12,21 +12,16 @@ SPEEDS = {"mps": 1.0, "kmh": 1.0 / 3.6, **dict.fromkeys(("kn", "kt", "kts"), 185
 
 
 class Quantity(NamedTuple):
-    """A quantity that sensors measure.
+    """A quantity that sensors measure."""
 
-    units: one of `LENGTHS`, `HEIGHTS`, `ANGLES`, `SPEEDS`. unit: unit in scenario files and messages. per_si: number of
-    these units in one SI unit. least: smallest value without noise and bias, SI. most: largest size in a recording, SI,
-    or inf if it is limited like positions. far: standard deviation of measurements with an unknown bias, SI.
-    usual_bias, unknown: standard deviations of a bias, in `unit`, before any recording (of lengths, at least
-    `USUAL_SHARE` of the range), and above which it counts as not found.
-    """
-
-    units: Mapping[str, float]
-    unit: str
-    per_si: float
-    least: float
-    most: float
-    far: float
+    units: Mapping[str, float]  # one of `LENGTHS`, `HEIGHTS`, `ANGLES`, `SPEEDS`
+    unit: str  # unit in scenario files and messages
+    per_si: float  # number of these units in one SI unit
+    least: float  # smallest value without noise and bias, SI
+    most: float  # largest size in a recording, SI, or inf if it is limited like positions
+    far: float  # standard deviation of measurements with an unknown bias, SI
+    # standard deviations of a bias, in `unit`, before any recording (of lengths, at least `USUAL_SHARE` of the range),
+    # and above which it counts as not found
     usual_bias: float
     unknown: float
 

@@ -21,21 +21,13 @@ _LASTING = _WINDOW // _EVERY  # tests without a finding until it is gone, as the
 
 @dataclass(frozen=True, slots=True, eq=False)
 class LiveFit:
-    """Window of the latest instants, and what the model does not explain in it.
+    """Window of the latest instants, and what the model does not explain in it."""
 
-    Attributes:
-        before: the latest instant, or None before the first.
-        compared: the instants of the window.
-        num_scans: scans since the last test.
-        found: findings, each with the number of tests since it was found.
-        searched: as in `Fit`.
-    """
-
-    before: Instant | None = None
-    compared: tuple[Compared, ...] = ()
-    num_scans: int = 0
-    found: tuple[tuple[Finding, int], ...] = ()
-    searched: str = NOTHING
+    before: Instant | None = None  # the latest instant, or None before the first
+    compared: tuple[Compared, ...] = ()  # the instants of the window
+    num_scans: int = 0  # scans since the last test
+    found: tuple[tuple[Finding, int], ...] = ()  # findings, each with the number of tests since it was found
+    searched: str = NOTHING  # as in `Fit`
 
     @property
     def fit(self) -> Fit:

@@ -27,9 +27,6 @@ class Bias:
         range_rate: bias of range rates [m/s].
         elevation: bias of elevations [rad].
         altitude: bias of altitudes [m].
-
-    Raises:
-        InputError: a number that is not finite.
     """
 
     range: Real = 0.0

@@ -35,9 +35,6 @@ class MeasurementBirth:
         std: (state_dim,) standard deviation of the state of a new label, for the position about twice that of the
             noise.
         region: region in which targets appear. None: anywhere.
-
-    Raises:
-        InputError: an invalid field. The message has its name, the expected and the given value.
     """
 
     expected: float | Literal["learnt"]
@@ -103,9 +100,6 @@ class BirthModel:
             The classes of a sensor's measurements are in the same order (`vedette.models.ScanRows`).
         num_sites: number of birth sites.
         state_dim: length of a target's state.
-
-    Raises:
-        InputError: an invalid field. The message has its name, the expected and the given value.
     """
 
     existence: Floats

@@ -23,9 +23,6 @@ class CellGrid:
         region: the region.
         columns: number of cells from west to east.
         rows: number of cells from south to north.
-
-    Raises:
-        InputError: an invalid field. The message has its name, the expected and the given value.
     """
 
     region: Region

@@ -23,9 +23,6 @@ class SignalModel:
         mean_db: mean ratio of targets, d [dB].
         threshold_db: threshold above which the sensor reports a measurement, t [dB].
         clutter_db: mean power of clutter over that of the noise, c. 0: false measurements are noise [dB].
-
-    Raises:
-        InputError: a number that is not finite.
     """
 
     mean_db: Real

@@ -18,9 +18,6 @@ class Turn:
     Attributes:
         period: time of one turn [s].
         clockwise: direction seen from above. True for most radars.
-
-    Raises:
-        InputError: the period is not above 0.
     """
 
     period: Positive

@@ -37,9 +37,6 @@ class UndetectedModel:
         survival: probability of surviving one second. none: that of the survival model over a scan, for a target at
             rest at the centre of a cell.
         prior_rate: mean of the prior density of a learnt birth rate, a gamma density of shape 1/2 [1/s].
-
-    Raises:
-        InputError: an invalid field. The message has its name, the expected and the given value.
     """
 
     grid: CellGrid

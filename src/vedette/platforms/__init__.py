@@ -4,12 +4,11 @@ from vedette.platforms.base import Actions, Options, Platform, options_at
 from vedette.platforms.by_compass import ByCompass
 from vedette.platforms.camera import MountedPlatform, Pointing
 from vedette.platforms.compass import Compass, PlaneCompass
-from vedette.platforms.courses import PAPER_HEADINGS_DEG, HeadingPlatform
+from vedette.platforms.courses import PAPER_HEADINGS_DEG, GridPlatform, HeadingPlatform, Stationary, Waypoints
 from vedette.platforms.fleet import Fleet
 from vedette.platforms.operated import Operated
-from vedette.platforms.patrolling import Patrolling
 from vedette.platforms.sequences import Sequences
-from vedette.platforms.steps import GridPlatform, Stationary, Waypoints
+from vedette.platforms.wrapper import Patrolling
 
 __all__ = [
     "PAPER_HEADINGS_DEG",

@@ -9,8 +9,7 @@ from vedette.models.arguments import instance
 from vedette.platforms.base import Platform, actions_at, check_platform, courses_of, scans_of
 from vedette.platforms.camera import MountedPlatform, Pointing
 from vedette.platforms.compass import Compass, PlaneCompass, course_deg
-from vedette.platforms.courses import HeadingPlatform
-from vedette.platforms.steps import GridPlatform, Waypoints
+from vedette.platforms.courses import GridPlatform, HeadingPlatform, Waypoints
 
 _COURSES = {"heading_deg": "course_deg", "pointing_deg": "azimuth_deg"}
 _NAMES = {**_COURSES, "speed": "speed_mps"}

@@ -34,19 +34,12 @@ from vedette.simulation.records import RunRecord
 
 @dataclass(frozen=True, slots=True)
 class Drawing:
-    """A figure with its texts.
+    """A figure with its texts."""
 
-    Attributes:
-        name: fit for a file name.
-        title: heading.
-        caption: description of the figure, its bands and marks.
-        figure: Matplotlib figure.
-    """
-
-    name: str
-    title: str
-    caption: str
-    figure: Figure
+    name: str  # fit for a file name
+    title: str  # heading
+    caption: str  # description of the figure, its bands and marks
+    figure: Figure  # Matplotlib figure
 
     @property
     def is_wide(self) -> bool:

@@ -15,20 +15,14 @@ _ROOM = 0.06  # share of the axis that is left free at each side
 
 @dataclass(frozen=True, slots=True)
 class ForestRow:
-    """One strategy of a forest plot.
+    """One strategy of a forest plot."""
 
-    Attributes:
-        name, words: name and description of the strategy.
-        error: mean OSPA with its standard error.
-        pair: comparison of the first strategy with this one, None for the first itself.
-        mean, low, high: positions of the difference and of the ends of its interval on the axis, in percent of the
-            width, or None for the first strategy, and for the interval of one run.
-    """
-
-    name: str
+    name: str  # name and description of the strategy
     words: str
-    error: str
-    pair: PairwiseComparison | None
+    error: str  # mean OSPA with its standard error
+    pair: PairwiseComparison | None  # comparison of the first strategy with this one, None for the first itself
+    # positions of the difference and of the ends of its interval on the axis, in percent of the width, or None for the
+    # first strategy, and for the interval of one run
     mean: float | None = None
     low: float | None = None
     high: float | None = None
@@ -36,22 +30,14 @@ class ForestRow:
 
 @dataclass(frozen=True, slots=True)
 class Forest:
-    """Rows of a forest plot with their axis.
+    """Rows of a forest plot with their axis."""
 
-    Attributes:
-        title: scenario, runs and time window.
-        error, difference: column headings, with units.
-        rows: one per strategy, the reference first.
-        ticks: position on the axis in percent of the width, and text.
-        note: statement of the significant differences.
-    """
-
-    title: str
-    error: str
+    title: str  # scenario, runs and time window
+    error: str  # column headings, with units
     difference: str
-    rows: tuple[ForestRow, ...]
-    ticks: tuple[tuple[float, str], ...]
-    note: str
+    rows: tuple[ForestRow, ...]  # one per strategy, the reference first
+    ticks: tuple[tuple[float, str], ...]  # position on the axis in percent of the width, and text
+    note: str  # statement of the significant differences
 
 
 def forest_of(group: Group) -> Forest | None:

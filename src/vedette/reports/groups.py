@@ -27,23 +27,14 @@ from vedette.simulation.records import RunRecord
 
 @dataclass(frozen=True, slots=True)
 class Strategy:
-    """One cell of a group with its runs.
+    """One cell of a group with its runs."""
 
-    Attributes:
-        cell: strategy and setting.
-        label: value of the compared axis, as text.
-        num_finished: number of finished runs.
-        ensemble: the common runs of the group, or all finished runs if there are no common ones.
-        counted: (num_scans,) whether a scan counts in means over time, all of them without a comparison.
-        record: function from the number of one of these runs to its record.
-    """
-
-    cell: Cell
-    label: str
-    num_finished: int
-    ensemble: Ensemble
-    counted: Bools
-    record: Callable[[int], RunRecord]
+    cell: Cell  # strategy and setting
+    label: str  # value of the compared axis, as text
+    num_finished: int  # number of finished runs
+    ensemble: Ensemble  # the common runs of the group, or all finished runs if there are no common ones
+    counted: Bools  # (num_scans,) whether a scan counts in means over time, all of them without a comparison
+    record: Callable[[int], RunRecord]  # function from the number of one of these runs to its record
 
     @property
     def name(self) -> str:
@@ -68,23 +59,15 @@ class Strategy:
 
 @dataclass(frozen=True, slots=True)
 class Group:
-    """Strategies that differ only in the compared axis.
+    """Strategies that differ only in the compared axis."""
 
-    Attributes:
-        name: fit for a file name and an anchor, unique in the campaign.
-        title: settings that distinguish the group from the others.
-        strategies: in the order of the specification, without those that have no finished run.
-        missing: names of strategies without a finished run.
-        comparison: over the common runs, with the labels as names of its strategies, or None if there are none.
-        reason: why there is no comparison, empty if there is one.
-    """
-
-    name: str
-    title: str
-    strategies: tuple[Strategy, ...]
-    missing: tuple[str, ...]
+    name: str  # fit for a file name and an anchor, unique in the campaign
+    title: str  # settings that distinguish the group from the others
+    strategies: tuple[Strategy, ...]  # in the order of the specification, without those that have no finished run
+    missing: tuple[str, ...]  # names of strategies without a finished run
+    # over the common runs, with the labels as names of its strategies, or None if there are none
     comparison: Comparison | None
-    reason: str
+    reason: str  # why there is no comparison, empty if there is one
 
 
 def comparison_groups(results: CampaignResults) -> Iterator[Group]:

@@ -17,14 +17,10 @@ _NONE = "\N{EN DASH}"
 
 @dataclass(frozen=True, slots=True)
 class DiagnosticsTable:
-    """Checks of several strategies, without those that are `ok` for every strategy.
+    """Checks of several strategies, without those that are `ok` for every strategy."""
 
-    Attributes:
-        strategies: names, one per column.
-        rows: one diagnostic per strategy. Those of a row have the same name and meaning.
-    """
-
-    strategies: tuple[str, ...]
+    strategies: tuple[str, ...]  # names, one per column
+    # one diagnostic per strategy. Those of a row have the same name and meaning
     rows: tuple[tuple[Diagnostic, ...], ...]
 
 

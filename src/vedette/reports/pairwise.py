@@ -17,27 +17,19 @@ Verdict = Literal["better", "worse", "unclear", "unknown"]
 
 @dataclass(frozen=True, slots=True)
 class PairwiseComparison:
-    """Comparison of one strategy with another.
+    """Comparison of one strategy with another."""
 
-    Attributes:
-        verdict: of `first` against `second`: better, worse, unclear (no significant difference), or unknown (one run).
-            It is corrected for the number of pairs (Holm).
-        first, second: names of the strategies.
-        sentence: the finding with its numbers.
-        mean, low, high: paired difference in mean OSPA, second minus first, with its 95 % interval, or NaN for one run.
-        difference: the same as text: "+1.20 (+0.80 to +1.60)".
-        win_rate: share of the runs in which `first` is better: "93 %", or "unknown" for one run.
-    """
-
+    # of `first` against `second`: better, worse, unclear (no significant difference), or unknown (one run). It is
+    # corrected for the number of pairs (Holm)
     verdict: Verdict
-    first: str
+    first: str  # names of the strategies
     second: str
-    sentence: str
-    mean: float
+    sentence: str  # the finding with its numbers
+    mean: float  # paired difference in mean OSPA, second minus first, with its 95 % interval, or NaN for one run
     low: float
     high: float
-    difference: str
-    win_rate: str
+    difference: str  # the same as text: "+1.20 (+0.80 to +1.60)"
+    win_rate: str  # share of the runs in which `first` is better: "93 %", or "unknown" for one run
 
 
 def compare_with_first(comparison: Comparison) -> tuple[PairwiseComparison, ...]:

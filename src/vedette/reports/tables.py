@@ -29,21 +29,13 @@ Measure = Callable[[Ensemble, Bools], Floats]
 
 @dataclass(frozen=True, slots=True)
 class Table:
-    """Cells of text under a header. The first column names the rows.
+    """Cells of text under a header. The first column names the rows."""
 
-    Attributes:
-        caption: description of the numbers.
-        header: one entry per column.
-        rows: as long as the header.
-        notes: descriptions of the rows where the names do not suffice. May be empty.
-        is_words: whether the cells are words rather than numbers.
-    """
-
-    caption: str
-    header: tuple[str, ...]
-    rows: tuple[tuple[str, ...], ...]
-    notes: tuple[str, ...] = ()
-    is_words: bool = False
+    caption: str  # description of the numbers
+    header: tuple[str, ...]  # one entry per column
+    rows: tuple[tuple[str, ...], ...]  # as long as the header
+    notes: tuple[str, ...] = ()  # descriptions of the rows where the names do not suffice. May be empty
+    is_words: bool = False  # whether the cells are words rather than numbers
 
     @property
     def short_header(self) -> tuple[str, ...]:
@@ -199,20 +191,13 @@ def _consistency(strategy: Strategy, dim: int) -> str:
 
 @dataclass(frozen=True, slots=True)
 class NeesSpread:
-    """Spread of the position NEES of a strategy, divided by its dimension 2.
+    """Spread of the position NEES of a strategy, divided by its dimension 2."""
 
-    Attributes:
-        median: median of the means at the scans of all runs.
-        largest: largest value of a single estimate.
-        run, time: run and time of that estimate, the time in s.
-        is_by_chance: whether a consistent filter exceeds it in more than one of a thousand such comparisons.
-    """
-
-    median: float
-    largest: float
-    run: int
+    median: float  # median of the means at the scans of all runs
+    largest: float  # largest value of a single estimate
+    run: int  # run and time of that estimate, the time in s
     time: float
-    is_by_chance: bool
+    is_by_chance: bool  # whether a consistent filter exceeds it in more than one of a thousand such comparisons
 
 
 def nees_spread(strategy: Strategy) -> NeesSpread | None:

@@ -25,15 +25,12 @@ _MIN_RATE = 0.1  # per scan; the lowest rate that is assumed
 
 
 class PlacedScan(NamedTuple):
-    """A scan as places.
+    """A scan as places."""
 
-    time: s. places: (num, 2) m. stds: (num,) noise of each place, m. detection: (num,) probability of detection there.
-    """
-
-    time: float
-    places: Floats
-    stds: Floats
-    detection: Floats
+    time: float  # s
+    places: Floats  # (num, 2) m
+    stds: Floats  # (num,) noise of each place, m
+    detection: Floats  # (num,) probability of detection there
 
 
 def target_share(scans: Sequence[PlacedScan], speed: float) -> float:

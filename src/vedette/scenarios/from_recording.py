@@ -20,15 +20,11 @@ _MAX_HORIZON_STEPS = 100  # steps of a horizon
 
 
 class RecordingScenario(NamedTuple):
-    """A scenario of a recording.
+    """A scenario of a recording."""
 
-    scenario: that a run tracks. recording: its scans. assumed: a description of each section that the sensors file does
-    not give, by its name.
-    """
-
-    scenario: Scenario
-    recording: RecordedScans
-    assumed: Mapping[str, str]
+    scenario: Scenario  # that a run tracks
+    recording: RecordedScans  # its scans
+    assumed: Mapping[str, str]  # a description of each section that the sensors file does not give, by its name
 
 
 def scenario_from_recording(
@@ -107,14 +103,11 @@ def _with_intervals(given: Mapping[str, Any], model: ScenarioModel, recording: R
 
 
 class LiveScenario(NamedTuple):
-    """A scenario of future scans.
+    """A scenario of future scans."""
 
-    scenario: by which a loop takes scans. conventions: of the scans. assumed: see `RecordingScenario`.
-    """
-
-    scenario: Scenario
-    conventions: Conventions
-    assumed: Mapping[str, str]
+    scenario: Scenario  # by which a loop takes scans
+    conventions: Conventions  # of the scans
+    assumed: Mapping[str, str]  # see `RecordingScenario`
 
 
 def scenario_from_sensors(

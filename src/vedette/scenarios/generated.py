@@ -45,9 +45,6 @@ class GeneratedScene:
         num_targets: 1 to 2000; None: two per sensor.
         decide_every: scans between decisions, 1 to 59; the horizon ends at the next decision, or at the last scan.
         seed: of places and courses, at least 0.
-
-    Raises:
-        InputError: names the field, and the expected and given values.
     """
 
     num_sensors: int

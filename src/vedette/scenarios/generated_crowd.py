@@ -27,9 +27,6 @@ class GeneratedCrowd:
         clutter: false measurements per target and scan, 0 to 100.
         measured: "position", or "bearing_range" from outside the square.
         num_steps: scans, 1 to 10,000.
-
-    Raises:
-        InputError: names the field, and the expected and given values.
     """
 
     num_targets: int = 100

@@ -34,21 +34,13 @@ _MIN_DETECTION = 0.1  # a place is covered if a sensor has this probability of d
 
 
 class NewTargets(NamedTuple):
-    """New targets at places that the sensors cover: birth sites and points of the region.
+    """New targets at places that the sensors cover: birth sites and points of the region."""
 
-    Attributes:
-        needed: (num,) number of detections until the existence exceeds one half; inf: never.
-        given: (num,) expected detections of a target in the run, in its life, or in view, whichever is shortest.
-        seconds: (num,) mean time from the birth until the target is reported.
-        births: (num,) expected births in the run.
-        reported: (num,) expected number of these that are reported.
-    """
-
-    needed: Floats
-    given: Floats
-    seconds: Floats
-    births: Floats
-    reported: Floats
+    needed: Floats  # (num,) number of detections until the existence exceeds one half; inf: never
+    given: Floats  # (num,) expected detections of a target in the run, in its life, or in view, whichever is shortest
+    seconds: Floats  # (num,) mean time from the birth until the target is reported
+    births: Floats  # (num,) expected births in the run
+    reported: Floats  # (num,) expected number of these that are reported
 
     @property
     def late_share(self) -> float:

@@ -40,15 +40,11 @@ _ASSUMED = ("region", "motion", "survival", "birth")  # each is assumed from the
 
 
 class SensorsFile(NamedTuple):
-    """A valid sensors file.
+    """A valid sensors file."""
 
-    names: of the sensors. quantities: that they measure, such as "bearing". not_given: sections that `vedette track`
-    assumes.
-    """
-
-    names: tuple[str, ...]
-    quantities: tuple[str, ...]
-    not_given: tuple[str, ...]
+    names: tuple[str, ...]  # of the sensors
+    quantities: tuple[str, ...]  # that they measure, such as "bearing"
+    not_given: tuple[str, ...]  # sections that `vedette track` assumes
 
     @property
     def summary(self) -> str:

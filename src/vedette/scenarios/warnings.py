@@ -9,7 +9,6 @@ import numpy as np
 from vedette.internal.cut_births import MAX_CUT_SHARE, cut_share
 from vedette.kernels.base.types import LONGEST_MODE_STEP, Bools, Floats
 from vedette.scenarios.coastline import coastline_warnings
-from vedette.scenarios.coverage_warnings import coverage_warnings
 from vedette.scenarios.diagnostics import Diagnostic, Path
 from vedette.scenarios.loading import Scenario, locate_fault, read_document
 from vedette.scenarios.new_targets import new_target_warnings
@@ -27,7 +26,7 @@ from vedette.scenarios.sections.sensors import Sensor
 from vedette.scenarios.sections.targets import RecordedTargets
 from vedette.scenarios.sections.tracking import LABEL_LIMITED, Filter
 from vedette.scenarios.sections.world import grouped_order
-from vedette.scenarios.start_warnings import start_warnings
+from vedette.scenarios.start_warnings import coverage_warnings, start_warnings
 from vedette.scenarios.suggestions import is_valid_with, suggest_fusions, suggest_label_settings
 from vedette.scenarios.unit_checks import implausible_settings
 

@@ -2,7 +2,7 @@
 
 from vedette.control import RequiresTruth
 from vedette.kernels.gaussian.scans import CLUTTER
-from vedette.simulation.born_targets import PoissonTargets
+from vedette.simulation.born_targets import PoissonTargets, UniformTargets
 from vedette.simulation.experiment import Experiment
 from vedette.simulation.loop import ScanOutcome, SimulationRun, simulate
 from vedette.simulation.oracle import OraclePlanner, Schedule
@@ -12,7 +12,6 @@ from vedette.simulation.storage import load_run, save_run
 from vedette.simulation.true_sensors import TrueSensor
 from vedette.simulation.true_targets import TrueTargetsPlanner
 from vedette.simulation.truth import ScriptedTargets, TargetSource, Truth
-from vedette.simulation.uniform_targets import UniformTargets
 
 __all__ = [
     "CLUTTER",

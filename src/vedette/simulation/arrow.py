@@ -60,14 +60,10 @@ _ARROW_TYPES = {**{kind: _NAMES[dtype] for kind, dtype in _DTYPES.items()}, Kind
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Layout:
-    """Columns of a table.
+    """Columns of a table."""
 
-    Attributes:
-        fixed: required columns.
-        more: prefixes of optional columns, of which there may be any number. The empty text: any name.
-    """
-
-    fixed: Mapping[str, Kind]
+    fixed: Mapping[str, Kind]  # required columns
+    # prefixes of optional columns, of which there may be any number. The empty text: any name
     more: Mapping[str, Kind] = field(default_factory=dict)
 
     def kind(self, name: str) -> Kind | None:

@@ -19,23 +19,16 @@ class CovarianceRecursion:
 
     Covariances go through P <- F P F' + Q, then P^-1 <- P^-1 + P_D H' R^-1 H of each sensor that scans, where P_D is
     the share of scans that detect the target (posterior Cramer-Rao bound, Tichavsky, Muravchik and Nehorai 1998).
-
-    Attributes:
-        transitions, noises: F and Q, (num_scans, num_targets, dim, dim).
-        alive: (num_scans, num_targets) 1 if the target exists, else 0.
-        sensor_information: P_D H' R^-1 H of the scans of each sensor, (num_courses, num_scans, num_targets, dim, dim).
-        powers: weight of each sensor's information in the fused density.
-        one_belief: whether all scans update one density, which sensors share after every scan.
-        cutoff: error that counts as a lost target, m.
     """
 
-    transitions: Floats
+    transitions: Floats  # F and Q, (num_scans, num_targets, dim, dim)
     noises: Floats
-    alive: Floats
+    alive: Floats  # (num_scans, num_targets) 1 if the target exists, else 0
+    # P_D H' R^-1 H of the scans of each sensor, (num_courses, num_scans, num_targets, dim, dim)
     sensor_information: tuple[Floats, ...]
-    powers: tuple[float, ...]
-    one_belief: bool
-    cutoff: float
+    powers: tuple[float, ...]  # weight of each sensor's information in the fused density
+    one_belief: bool  # whether all scans update one density, which sensors share after every scan
+    cutoff: float  # error that counts as a lost target, m
 
     def follow(self, covs: Sequence[Floats], actions: Ints) -> tuple[Floats, list[Floats]]:
         """(num_joint,) cost of joint actions (num_joint, num_sensors), and the covariances after the last scan.

@@ -25,47 +25,28 @@ class Health(SummaryRepr):
     Arrays have the shape (num_scans, num_sensors), those of the fusion as a whole (`fusion_...`) (num_scans,). Booleans
     are 0 or 1. Without a fusion, or with a custom one that reports no `FusionInfo`, its numbers are 0. The report of
     one filter for all sensors is repeated for every sensor, its numbers of measurements only for the first.
-
-    Attributes:
-        log_likelihood: log likelihood of the scan, given the prior.
-        num_hypotheses, num_tracks: size of the posterior.
-        truncation_error_bound: upper bound on the truncated share of posterior weight, or NaN if unknown.
-        dropped_existence: expected number of targets in dropped labels.
-        num_clutter_floored: measurements whose clutter intensity was raised to its floor.
-        num_duplicates: measurements left out because they repeat another.
-        num_inexact_clusters: clusters of an LMB not summed exactly.
-        search_truncated: whether the ranking search stopped early.
-        limit_reached: whether the posterior reached its maximum size.
-        independence_error_bound: upper bound on the L1 error of treating labels as independent, for factored densities.
-        num_missing_sets: label sets that another sensor has and this one does not (for CLMB, labels).
-        num_missing_labels: labels that this sensor does not know at all.
-        bytes_sent: bytes that this sensor sent by radio, or to the fusion centre, or 0 if not counted.
-        fusion_num_sets: label sets that were fused (for CLMB, labels).
-        fusion_num_lost_labels: labels that are certain at a sensor and not in the fused density.
-        fusion_empty_intersection: whether no label set is held by every sensor.
-        fusion_log_normaliser: log of the set integral of the product of the powers.
-        fusion_discarded_weight: probability of the fused label sets that were truncated.
     """
 
-    log_likelihood: Floats
-    num_hypotheses: Ints
-    num_tracks: Ints
-    truncation_error_bound: Floats
-    dropped_existence: Floats
-    num_clutter_floored: Ints
-    num_duplicates: Ints
-    num_inexact_clusters: Ints
-    search_truncated: Ints
-    limit_reached: Ints
+    log_likelihood: Floats  # log likelihood of the scan, given the prior
+    num_hypotheses: Ints  # size of the posterior
+    num_tracks: Ints  # size of the posterior
+    truncation_error_bound: Floats  # upper bound on the truncated share of posterior weight, or NaN if unknown
+    dropped_existence: Floats  # expected number of targets in dropped labels
+    num_clutter_floored: Ints  # measurements whose clutter intensity was raised to its floor
+    num_duplicates: Ints  # measurements left out because they repeat another
+    num_inexact_clusters: Ints  # clusters of an LMB not summed exactly
+    search_truncated: Ints  # whether the ranking search stopped early
+    limit_reached: Ints  # whether the posterior reached its maximum size
+    # upper bound on the L1 error of treating labels as independent, for factored densities
     independence_error_bound: Floats
-    num_missing_sets: Ints
-    num_missing_labels: Ints
-    bytes_sent: Ints
-    fusion_num_sets: Ints
-    fusion_num_lost_labels: Ints
-    fusion_empty_intersection: Ints
-    fusion_log_normaliser: Floats
-    fusion_discarded_weight: Floats
+    num_missing_sets: Ints  # label sets that another sensor has and this one does not (for CLMB, labels)
+    num_missing_labels: Ints  # labels that this sensor does not know at all
+    bytes_sent: Ints  # bytes that this sensor sent by radio, or to the fusion centre, or 0 if not counted
+    fusion_num_sets: Ints  # label sets that were fused (for CLMB, labels)
+    fusion_num_lost_labels: Ints  # labels that are certain at a sensor and not in the fused density
+    fusion_empty_intersection: Ints  # whether no label set is held by every sensor
+    fusion_log_normaliser: Floats  # log of the set integral of the product of the powers
+    fusion_discarded_weight: Floats  # probability of the fused label sets that were truncated
 
     def _summary(self) -> str:
         num_scans, num_sensors = self.num_tracks.shape

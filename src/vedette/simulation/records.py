@@ -59,22 +59,17 @@ class Decision(SummaryRepr):
 
 @dataclass(frozen=True, slots=True)
 class RunSummary:
-    """Part of a record that comparisons and reports use: no targets or tracks.
+    """Part of a record that comparisons and reports use: no targets or tracks."""
 
-    Attributes:
-        scenario, seed, run, times, decisions, ospa, health, timings: as in the record, without explanations.
-        num_targets: (num_scans,) number of true targets.
-    """
-
-    scenario: str
-    seed: int
-    run: int
-    times: Floats
-    decisions: tuple[Decision, ...]
-    ospa: Floats
-    num_targets: Ints
-    health: Health
-    timings: dict[str, Floats]
+    scenario: str  # as in the record, without explanations
+    seed: int  # as in the record, without explanations
+    run: int  # as in the record, without explanations
+    times: Floats  # as in the record, without explanations
+    decisions: tuple[Decision, ...]  # as in the record, without explanations
+    ospa: Floats  # as in the record, without explanations
+    num_targets: Ints  # (num_scans,) number of true targets
+    health: Health  # as in the record, without explanations
+    timings: dict[str, Floats]  # as in the record, without explanations
 
 
 class ScansFile(NamedTuple):

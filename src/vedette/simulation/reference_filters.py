@@ -22,15 +22,10 @@ _LOST = 1000.0  # m and m/s: standard deviation of a target before its first sca
 
 @dataclass(slots=True, eq=False)
 class _Reference:
-    """Common part of both: a `vedette.tracking.CentralFilter` whose density is an LMB.
+    """Common part of both: a `vedette.tracking.CentralFilter` whose density is an LMB."""
 
-    Attributes:
-        targets: target model of the filters.
-        sensors: all sensors.
-    """
-
-    targets: TargetModel
-    sensors: tuple[SensorModel, ...]
+    targets: TargetModel  # target model of the filters
+    sensors: tuple[SensorModel, ...]  # all sensors
 
     def initial(self) -> LMB:
         """Return a density without targets."""

@@ -125,9 +125,6 @@ class ScriptedTargets:
         process_noise: whether the motion's process noise is applied, one flag, or one per target.
         initial_stds: (num_targets, state_dim) standard deviations of the initial states, which each run draws anew
             around `initial_states`, components independent. None: all zero.
-
-    Raises:
-        InputError: names the field, the expected and the given value.
     """
 
     motion: MotionModel

@@ -29,27 +29,17 @@ _QUICK = 20_000
 
 @dataclass(frozen=True, slots=True, eq=False)
 class AdditiveRewards:
-    """Rewards that are made of sums over labels.
+    """Rewards that are made of sums over labels."""
 
-    Attributes:
-        table: changes of each label by the scans of each course.
-        valuation: contribution of a label to the reward.
-        bases: for each sensor, the rows of its own belief without scans.
-        reward: its `combine` turns the sums into rewards. None: the reward is the sum itself.
-        cells: expected numbers of undetected targets by cell, and the cells that each course sees.
-        prices: (num_courses,) price of each course, in units of the reward.
-        num_threads: threads that may share the work. The result does not depend on it.
-        num_horizons: number of horizons at whose ends labels are evaluated. The labels of each horizon are separate
-            labels, one horizon after the other.
-    """
-
-    table: Table
-    valuation: Valuation
-    bases: tuple[Floats, ...]
-    reward: Any
-    cells: Cells
-    prices: Floats
-    num_threads: int
+    table: Table  # changes of each label by the scans of each course
+    valuation: Valuation  # contribution of a label to the reward
+    bases: tuple[Floats, ...]  # for each sensor, the rows of its own belief without scans
+    reward: Any  # its `combine` turns the sums into rewards. None: the reward is the sum itself
+    cells: Cells  # expected numbers of undetected targets by cell, and the cells that each course sees
+    prices: Floats  # (num_courses,) price of each course, in units of the reward
+    num_threads: int  # threads that may share the work. The result does not depend on it
+    # number of horizons at whose ends labels are evaluated. The labels of each horizon are separate labels, one horizon
+    # after the other
     num_horizons: int = 1
 
     @property

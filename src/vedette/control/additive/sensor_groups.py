@@ -7,8 +7,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from vedette.control.known_models import decision_of
-from vedette.control.prediction import Prediction
-from vedette.control.sampling import draw_paths, targets_of
+from vedette.control.prediction import Prediction, draw_paths, targets_of
 from vedette.control.settings import IDEAL_MODES, MobileSensor, PlanningSettings, scans_within
 from vedette.densities import LMB
 from vedette.densities.checks import offsets_of

@@ -6,7 +6,12 @@ from typing import ClassVar, NamedTuple
 
 import numpy as np
 
-from vedette.control.constraints.protocol import ActivationConstraint, Constraint, ConstraintContext
+from vedette.control.constraints.protocol import (
+    ActivationConstraint,
+    Constraint,
+    ConstraintContext,
+    PerSensorConstraint,
+)
 from vedette.kernels.base.types import BUDGET, Bools, Floats, Ints
 from vedette.models.arguments import provides
 from vedette.models.fields import Checked, Count, part
@@ -14,7 +19,7 @@ from vedette.models.fields import Checked, Count, part
 
 @part("max_active", "constraint")
 @dataclass(frozen=True, slots=True)
-class MaxActive(Checked):
+class MaxActive(PerSensorConstraint, Checked):
     """A limit on the number of sensors that scan after a decision. The others take an action that switches them off.
 
     Each course of a sensor that can be switched is listed a second time without scans. The constraint therefore forbids
@@ -22,43 +27,31 @@ class MaxActive(Checked):
 
     Attributes:
         sensors: largest number of sensors that scan.
-
-    Raises:
-        InputError: a number below 1.
     """
 
     sensors: Count
     name: ClassVar[str] = "max_active"
     needs_beliefs: ClassVar[bool] = False
     time_invariant = True
-    reach = 0.0
 
     @property
     def most_active(self) -> int:
         """Largest number of sensors that scan."""
         return self.sensors
 
-    def courses(self, situation: ConstraintContext) -> tuple[Bools, ...]:
-        """Return masks that allow all courses."""
-        return tuple(np.ones(len(own), np.bool_) for own in situation.courses)
-
-    def pairs(self, situation: ConstraintContext, first: int, second: int) -> Bools | None:
-        """Return None: all pairs of courses are allowed."""
-        return None
+    def violations(self, situation: ConstraintContext) -> tuple[Floats, ...]:
+        """Return 0 for all courses."""
+        return tuple(np.zeros(len(own)) for own in situation.courses)
 
 
 class Active(NamedTuple):
-    """The courses that scan, and the number of sensors that may scan.
+    """The courses that scan, and the number of sensors that may scan."""
 
-    on: (num_courses,) whether each course scans, one array per sensor.
-    off: (num_courses,) index of the course with the same poses that does not scan, or the course itself if it does not
-        scan, or if its sensor cannot be switched off.
-    limit: number of sensors that may scan.
-    """
-
-    on: tuple[Bools, ...]
+    on: tuple[Bools, ...]  # (num_courses,) whether each course scans, one array per sensor
+    # (num_courses,) index of the course with the same poses that does not scan, or the course itself if it does not
+    # scan, or if its sensor cannot be switched off
     off: tuple[Ints, ...]
-    limit: int
+    limit: int  # number of sensors that may scan
 
     def excess(self, actions: Ints) -> Ints:
         """Return (num,) the number of sensors that scan beyond the limit in joint actions (num, num_sensors)."""

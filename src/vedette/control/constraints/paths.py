@@ -22,22 +22,15 @@ MARGIN = 1e-3
 
 @dataclass(frozen=True, slots=True, eq=False)
 class VisibilityGraph:
-    """Shortest paths in the plane outside forbidden zones.
+    """Shortest paths in the plane outside forbidden zones."""
 
-    Attributes:
-        edges: edges of all zones.
-        nodes: (num_nodes, 2) m, the corners at which paths may bend, `MARGIN` outside the zones.
-        coast: (num_points, 2) m, points where free space extends farthest into the zones: at their other corners, and
-            where edges of two zones cross.
-        lengths: (num_nodes, num_nodes) m, lengths of the shortest paths between nodes, or inf if there is none.
-        before: (num_nodes, num_nodes) the node before the second one on the path from the first. Below 0: none.
-    """
-
-    edges: Edges
-    nodes: Floats
+    edges: Edges  # edges of all zones
+    nodes: Floats  # (num_nodes, 2) m, the corners at which paths may bend, `MARGIN` outside the zones
+    # (num_points, 2) m, points where free space extends farthest into the zones: at their other corners, and where
+    # edges of two zones cross
     coast: Floats
-    lengths: Floats
-    before: Ints
+    lengths: Floats  # (num_nodes, num_nodes) m, lengths of the shortest paths between nodes, or inf if there is none
+    before: Ints  # (num_nodes, num_nodes) the node before the second one on the path from the first. Below 0: none
 
     @classmethod
     def of(cls, zones: Sequence[Sequence[Floats]]) -> "VisibilityGraph":
@@ -129,21 +122,13 @@ class VisibilityGraph:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Paths:
-    """Shortest paths to a set of goals.
+    """Shortest paths to a set of goals."""
 
-    Attributes:
-        graph: visibility graph of the zones that the paths avoid.
-        points: (num_goals, 2) m, end points of the paths: the goals, or the nearest points that paths reach.
-        left: (num_goals,) m, distance from these points to the goals.
-        lengths: (num_nodes, num_goals) m, path length from each node to each point, or inf if there is no path.
-        last: (num_nodes, num_goals) the last node on that path.
-    """
-
-    graph: VisibilityGraph
-    points: Floats
-    left: Floats
-    lengths: Floats
-    last: Ints
+    graph: VisibilityGraph  # visibility graph of the zones that the paths avoid
+    points: Floats  # (num_goals, 2) m, end points of the paths: the goals, or the nearest points that paths reach
+    left: Floats  # (num_goals,) m, distance from these points to the goals
+    lengths: Floats  # (num_nodes, num_goals) m, path length from each node to each point, or inf if there is no path
+    last: Ints  # (num_nodes, num_goals) the last node on that path
 
     def are_straight(self, starts: Floats) -> Bools:
         """Return (num_starts, num_goals) whether the line from each start (num_starts, 2) to each point is free."""

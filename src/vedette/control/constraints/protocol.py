@@ -138,7 +138,7 @@ class PerSensorConstraint:
     """A constraint on each sensor alone: a violation above 0 is forbidden, and all pairs of courses are compatible."""
 
     __slots__ = ()
-    reach = 0.0
+    interaction_range = 0.0
 
     def violations(self, situation: ConstraintContext) -> tuple[Floats, ...]:
         """Return (num_courses,) the violation of each course, one array per sensor."""

@@ -23,9 +23,6 @@ class StayInside(PerSensorConstraint, Checked):
 
     Attributes:
         region: the rectangle.
-
-    Raises:
-        InputError: an object other than a region.
     """
 
     region: Region

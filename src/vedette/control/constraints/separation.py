@@ -20,9 +20,6 @@ class Separation(Checked):
 
     Attributes:
         distance: least distance, which is allowed itself [m].
-
-    Raises:
-        InputError: a distance that is not above 0.
     """
 
     distance: Positive

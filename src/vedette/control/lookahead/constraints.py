@@ -53,23 +53,15 @@ class MultiStepConstraints:
     """Constraints on several decisions.
 
     Each course is tested from its beginning to the end of its horizon, or to the next decision if that is later.
-
-    Attributes:
-        constraints: at least one.
-        sensors, settings: as in the planner.
-        state: the present state.
-        poses: (num_sensors, pose_dim) present poses of the sensors.
-        stages: the decisions.
-        on_pairs: whether any constraint concerns pairs of sensors.
     """
 
-    constraints: tuple[Constraint, ...]
-    sensors: tuple[MobileSensor, ...]
-    settings: PlanningSettings
-    state: State
-    poses: Floats
-    stages: Stages
-    on_pairs: bool = field(init=False)
+    constraints: tuple[Constraint, ...]  # at least one
+    sensors: tuple[MobileSensor, ...]  # as in the planner
+    settings: PlanningSettings  # as in the planner
+    state: State  # the present state
+    poses: Floats  # (num_sensors, pose_dim) present poses of the sensors
+    stages: Stages  # the decisions
+    on_pairs: bool = field(init=False)  # whether any constraint concerns pairs of sensors
     _time_invariant: bool = field(init=False)
     _beliefs: dict[int, tuple[LabelledDensity, ...]] = field(default_factory=dict)
 

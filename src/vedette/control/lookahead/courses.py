@@ -29,24 +29,16 @@ class CourseTree:
     If no course is allowed, those with the least violation are kept. Of these, only the courses are kept after which
     there is the least number of further decisions without an allowed course. So a beginning that leads to a dead end is
     left out, unless all of them do.
-
-    Attributes:
-        sensor: its index.
-        platform: its platform.
-        pose: its present pose.
-        stages: the decisions.
-        ahead: the constraints. None: there are none.
-        now: (num_courses,) which courses are allowed at the first decision, at least one.
-        omits_dead_ends: whether dead ends are left out.
     """
 
-    sensor: int
-    platform: Platform
-    pose: Floats
-    stages: Stages
-    ahead: MultiStepConstraints | None = None
+    sensor: int  # its index
+    platform: Platform  # its platform
+    pose: Floats  # its present pose
+    stages: Stages  # the decisions
+    ahead: MultiStepConstraints | None = None  # the constraints. None: there are none
+    # (num_courses,) which courses are allowed at the first decision, at least one
     now: Bools = field(default_factory=lambda: np.empty(0, np.bool_))
-    omits_dead_ends: bool = True
+    omits_dead_ends: bool = True  # whether dead ends are left out
     _found: dict[Sequence, Options] = field(default_factory=dict)
     _at_poses: dict[tuple[bytes, int], Options] = field(default_factory=dict)
     _spots: dict[Sequence, bytes] = field(default_factory=dict)

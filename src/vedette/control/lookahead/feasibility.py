@@ -22,21 +22,13 @@ _MOST_TRIES = 10_000
 
 @dataclass(slots=True, eq=False)
 class FeasibleSequences:
-    """The joint sequences that constraints allow.
+    """The joint sequences that constraints allow."""
 
-    Attributes:
-        trees: course tree of each sensor alone.
-        ahead: constraints on pairs of sensors.
-        mask: of the first decision.
-        until: number of decisions at which pairs of sensors are tested.
-        start: a feasible joint sequence.
-    """
-
-    trees: tuple[CourseTree, ...]
-    ahead: MultiStepConstraints
-    mask: Mask
-    until: int
-    start: tuple[Sequence, ...]
+    trees: tuple[CourseTree, ...]  # course tree of each sensor alone
+    ahead: MultiStepConstraints  # constraints on pairs of sensors
+    mask: Mask  # of the first decision
+    until: int  # number of decisions at which pairs of sensors are tested
+    start: tuple[Sequence, ...]  # a feasible joint sequence
     _tables: dict[tuple[int, int, bytes, bytes, int], Bools | None] = field(default_factory=dict)
     _together: dict[tuple[int, int, Sequence, Sequence], bool] = field(default_factory=dict)
     _single: dict[tuple[int, Sequence], bool] = field(default_factory=dict)

@@ -52,23 +52,15 @@ class _Lists:
 
 @dataclass(slots=True, eq=False)
 class PrecomputedCourses:
-    """Rewards at the end of the horizon of one decision, the `stage`-th from now.
+    """Rewards at the end of the horizon of one decision, the `stage`-th from now."""
 
-    Attributes:
-        trees: course tree of each sensor.
-        stage: number of courses that each sensor has taken by then.
-        lay_out: computes the changes of some courses of each sensor, with the same samples each time.
-        weight: of these rewards in the value of a sequence.
-        first: the first decision, from 0, whose prices are subtracted here.
-        counts: filter steps and rewards so far.
-    """
-
-    trees: tuple[CourseTree, ...]
-    stage: int
+    trees: tuple[CourseTree, ...]  # course tree of each sensor
+    stage: int  # number of courses that each sensor has taken by then
+    # computes the changes of some courses of each sensor, with the same samples each time
     lay_out: Callable[[tuple[Options, ...]], Evaluator]
-    weight: float
-    first: int
-    counts: dict[str, int]
+    weight: float  # of these rewards in the value of a sequence
+    first: int  # the first decision, from 0, whose prices are subtracted here
+    counts: dict[str, int]  # filter steps and rewards so far
     _places: dict[tuple[int, Sequence], int] = field(default_factory=dict)
     _additive: AdditiveRewards | None = None
     _lists: tuple[_Lists, ...] = ()

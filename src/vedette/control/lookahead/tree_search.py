@@ -28,9 +28,6 @@ class TreeSearch(Checked):
         exploration: weight of rarely tried branches.
         rollout: "random": courses drawn at random. "repeat_last": every sensor repeats its last action.
         batch: rollouts that are evaluated together, which is faster. Each counts as a visit before its value is known.
-
-    Raises:
-        InputError: an exploration below 0, another rollout, a batch below 1.
     """
 
     exploration: NonNegative = 0.3

@@ -164,9 +164,6 @@ class ExpectedGospaReward(_OneSum, Checked):
 
     Attributes:
         cutoff: error that counts as a lost target, c [m].
-
-    Raises:
-        InputError: a cutoff that is not above 0.
     """
 
     cutoff: Positive = 100.0
@@ -196,9 +193,6 @@ class PeecsReward(Checked):
     Attributes:
         share: weight of the error of the number of targets.
         cutoff: error of a position that counts as 1, c [m].
-
-    Raises:
-        InputError: a share outside [0, 1], a cutoff that is not above 0.
     """
 
     share: Probability = 0.5

@@ -23,9 +23,6 @@ class CauchySchwarzReward:
     Attributes:
         unit_volume: unit K of hyper-volume (eq. 5): a number, or "reference" for (4 pi)^(d/2) sqrt(det P) of the
             prediction, for which K <p, p> is about 1 (paper-notes 15), and localisation counts as much as cardinality.
-
-    Raises:
-        InputError: another word, or a number that is not finite and above 0.
     """
 
     unit_volume: UnitVolume = 1.0
@@ -123,9 +120,6 @@ class ExpectedLossReward(Checked):
         order: power of the error, p, that of the score by which the tracks are evaluated: 1 for the usual OSPA, 2 for
             squared errors. A larger order gives more weight to the least certain targets, such as weak labels with wide
             densities.
-
-    Raises:
-        InputError: a cutoff or an order that is not above 0.
     """
 
     cutoff: Positive = 100.0

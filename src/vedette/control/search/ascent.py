@@ -35,9 +35,6 @@ class CoordinateAscent(Checked):
 
     Attributes:
         num_restarts: ascents from random joint actions, after that from the independent decision.
-
-    Raises:
-        InputError: a number below 0.
     """
 
     num_restarts: Repeats = 2
@@ -116,9 +113,6 @@ class AutomaticSearch(Checked):
 
     Attributes:
         max_joint_actions: number above which two or three sensors are searched by coordinate ascent, too.
-
-    Raises:
-        InputError: a bound below 1.
     """
 
     max_joint_actions: Count = 1_000_000
@@ -132,10 +126,8 @@ class AutomaticSearch(Checked):
         more = _FIRST_TRIES // sum(problem.shape) - _NUM_RESTARTS
         if cache.is_late():
             return cache.best()
-        if more > 0 and problem.bound is not None and _may_be_far(max(cache.values.values()), problem.bound()):
-            ascents(cache, cache.drawn(more, rng=rng))
+        if more > 0 and problem.bound is not None:
+            best, upper = max(cache.values.values()), problem.bound()
+            if upper - best > _LEAST_GAP * max(abs(upper), abs(best)):
+                ascents(cache, cache.drawn(more, rng=rng))
         return cache.best()
-
-
-def _may_be_far(best: float, upper: float) -> bool:
-    return upper - best > _LEAST_GAP * max(abs(upper), abs(best))

@@ -32,9 +32,6 @@ class CrossEntropy(Checked):
         elite_fraction: fraction of these that the probabilities move towards, in (0, 1).
         smoothing: step size of the probabilities in a round, in (0, 1]. 1: a full step.
         max_rounds: maximum number of rounds.
-
-    Raises:
-        InputError: a field out of range.
     """
 
     num_samples: Count = 200

@@ -29,9 +29,6 @@ class SequentialGreedy(Checked):
         order: "sensor_order": in the order of the sensors. "best_first": always the sensor that adds most. Its gain is
             assumed to shrink as others are decided, which saves most of the evaluations (lazy greedy, Minoux 1978). The
             gain may grow if another sensor leaves a target. Such a sensor is then evaluated later than it should be.
-
-    Raises:
-        InputError: another order.
     """
 
     order: Literal["sensor_order", "best_first"] = "sensor_order"

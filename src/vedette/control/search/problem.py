@@ -159,9 +159,6 @@ class ExhaustiveSearch(Checked):
 
     Attributes:
         max_joint_actions: limit on their number, which grows as a power of the number of sensors.
-
-    Raises:
-        InputError: a limit below 1.
     """
 
     max_joint_actions: Count = 1_000_000

@@ -27,15 +27,10 @@ from vedette.kernels.base.types import Bools, Floats
 
 @dataclass(frozen=True, slots=True)
 class SharedInterval:
-    """An interval over which several curves are equal.
+    """An interval over which several curves are equal."""
 
-    Attributes:
-        members: indices of the curves, increasing.
-        shown: (num_points,) True for the points of the interval. It may have gaps.
-    """
-
-    members: tuple[int, ...]
-    shown: Bools
+    members: tuple[int, ...]  # indices of the curves, increasing
+    shown: Bools  # (num_points,) True for the points of the interval. It may have gaps
 
 
 def shared_intervals(curves: Floats) -> tuple[SharedInterval, ...]:

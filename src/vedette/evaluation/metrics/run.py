@@ -10,8 +10,8 @@ from vedette.errors import VedetteError
 from vedette.evaluation.metrics.consistency import nees_of_matching
 from vedette.evaluation.metrics.matching import match_run
 from vedette.evaluation.metrics.point_gospa import gospa_of_matching
-from vedette.evaluation.metrics.time_to_track import waiting_times
 from vedette.evaluation.metrics.track_ospa import ospa2_of_run
+from vedette.evaluation.metrics.tracked_fraction import waiting_times
 from vedette.evaluation.metrics.trajectories import continuity
 from vedette.internal.representation import SummaryRepr
 from vedette.kernels.base.types import Floats, Ints

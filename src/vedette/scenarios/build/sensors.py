@@ -16,8 +16,7 @@ from vedette.models.correlation import discounted
 from vedette.models.modes import hiding_modes
 from vedette.platforms import Actions, ByCompass, Operated, Patrolling, Platform
 from vedette.platforms.base import SWITCH, actions_at
-from vedette.platforms.velocity import WithVelocity
-from vedette.platforms.wrapper import PlatformWrapper
+from vedette.platforms.wrapper import PlatformWrapper, WithVelocity
 from vedette.scenarios.loading import Scenario
 from vedette.scenarios.sections.custom import Custom, MissingMember
 from vedette.scenarios.sections.deciding import Lookahead

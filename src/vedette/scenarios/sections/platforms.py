@@ -41,7 +41,7 @@ class Stationary(_PlatformSection):
     """Stays where it is."""
 
     kind: Literal["stationary"] = Field(default="stationary", description="Kind of platform [-].")
-    of: ClassVar[str] = "vedette.platforms.steps:Stationary"
+    of: ClassVar[str] = "vedette.platforms.courses:Stationary"
 
 
 @derived("vedette.platforms.courses:HeadingPlatform", first=("speed", "speeds"))
@@ -78,7 +78,7 @@ class Heading(_PlatformSection):
         return max(self.speeds) if self.speeds is not None else self.speed or 0.0
 
 
-@derived("vedette.platforms.steps:GridPlatform")
+@derived("vedette.platforms.courses:GridPlatform")
 class GridMoves(_PlatformSection):
     """Steps of one length, each made at a speed and followed by waiting; an action is a step."""
 
@@ -89,7 +89,7 @@ class GridMoves(_PlatformSection):
         return (0.0, 0.0) if self.allow_staying else None
 
 
-@derived("vedette.platforms.steps:Waypoints")
+@derived("vedette.platforms.courses:Waypoints")
 class Waypoints(_PlatformSection):
     """Follows a path from waypoint to waypoint; an action is the waypoint to head for, counted from 1."""
 

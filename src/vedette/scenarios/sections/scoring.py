@@ -86,7 +86,7 @@ class TrackedFraction(Part):
     kind: Literal["tracked_fraction"] = Field(default="tracked_fraction", description="Kind of measure [-].")
 
 
-@derived("vedette.evaluation.metrics.time_to_track:TimeToTrack", without=("cutoff", "order"))
+@derived("vedette.evaluation.metrics.tracked_fraction:TimeToTrack", without=("cutoff", "order"))
 class TimeToTrack(Part):
     """At each scan, the mean time until the targets that appear at it are tracked, within the cutoff of `ospa` [s]."""
 

@@ -22,30 +22,21 @@ if TYPE_CHECKING:  # importing the planners imports the compiler, which a check 
 
 
 class Parts(NamedTuple):
-    """Parts of planners.
+    """Parts of planners."""
 
-    sensors: the sensors that are controlled. fusion: of their densities; with one sensor, of that alone. settings:
-    horizon, samples, caps, threads. reward: the value of a density. search: which joint actions are evaluated. others:
-    assumption of independent decisions about the other sensors. first_actions: action of each sensor before any
-    decision. constraints: on the sensors. notes: texts of plans about fusion and network. lookahead: arguments of
-    `vedette.control.HorizonPlanner` by name, about sequences of decisions. estimate: estimates the targets from the
-    fused belief. oracle: arguments of `vedette.simulation.OraclePlanner` by name, about scans and scores. scene:
-    function that returns the data of the scenario that a program receives.
-    """
-
-    sensors: tuple[MobileSensor, ...]
-    fusion: Fusion
-    settings: PlanningSettings
-    reward: PlannedReward
-    search: JointSearch
-    others: OthersAssumption
-    first_actions: tuple[Actions, ...]
-    constraints: tuple[Constraint, ...]
-    notes: tuple[str, ...]
-    lookahead: dict[str, Any]
-    estimate: Estimator
-    oracle: dict[str, Any]
-    scene: Callable[[], dict[str, Any]]
+    sensors: tuple[MobileSensor, ...]  # the sensors that are controlled
+    fusion: Fusion  # of their densities; with one sensor, of that alone
+    settings: PlanningSettings  # horizon, samples, caps, threads
+    reward: PlannedReward  # the value of a density
+    search: JointSearch  # which joint actions are evaluated
+    others: OthersAssumption  # assumption of independent decisions about the other sensors
+    first_actions: tuple[Actions, ...]  # action of each sensor before any decision
+    constraints: tuple[Constraint, ...]  # on the sensors
+    notes: tuple[str, ...]  # texts of plans about fusion and network
+    lookahead: dict[str, Any]  # arguments of `vedette.control.HorizonPlanner` by name, about sequences of decisions
+    estimate: Estimator  # estimates the targets from the fused belief
+    oracle: dict[str, Any]  # arguments of `vedette.simulation.OraclePlanner` by name, about scans and scores
+    scene: Callable[[], dict[str, Any]]  # function that returns the data of the scenario that a program receives
 
 
 class Strategy(Section):
