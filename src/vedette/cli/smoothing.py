@@ -13,6 +13,7 @@ from vedette.cli.output import echo
 if TYPE_CHECKING:
     from vedette.evaluation.joining import Join
     from vedette.scenarios import Scenario
+    from vedette.scenarios.from_recording import RecordingScenario
     from vedette.simulation.records import RunRecord
     from vedette.tracking import TraceEntry
 
@@ -25,23 +26,24 @@ def check_smoothing(smooth: bool, lag: float | None) -> None:
         raise usage_error(f"expected a time above 0 s; got {lag:g}", "--lag")
 
 
-def check_labels(scenario: Scenario) -> None:
-    """Raise a usage error if the targets of a filter have no labels."""
-    from vedette.filters import has_labels
-    from vedette.scenarios.build import build_sensors
+def check_labels(recorded: RecordingScenario) -> None:
+    """Raise a usage error if the targets of the tracker have no labels."""
+    from vedette.densities import LabelledDensity
+    from vedette.scenarios.build import build_tracking
 
-    if not all(has_labels(sensor.filter) for sensor in build_sensors(scenario)):
-        kind = scenario.model.filter.kind
+    if not isinstance(build_tracking(recorded.scenario, recorded.recording).tracker.initial().fused, LabelledDensity):
+        kind = recorded.scenario.model.filter.kind
         raise usage_error(f"expected a filter whose targets have labels, such as delta_glmb; got {kind}", "--smooth")
 
 
-def smoothed_record(record: RunRecord, scenario: Scenario, trace: Sequence[TraceEntry], lag: float | None) -> RunRecord:
+def smoothed_record(
+    record: RunRecord, recorded: RecordingScenario, trace: Sequence[TraceEntry], lag: float | None
+) -> RunRecord:
     """Return the record with smoothed estimates. lag: see `vedette.tracking.smooth`."""
-    from vedette.filters import common_target_model
-    from vedette.scenarios.build import build_sensors
+    from vedette.scenarios.build import build_tracking
     from vedette.tracking import smooth
 
-    targets = common_target_model([sensor.filter for sensor in build_sensors(scenario)])
+    targets = build_tracking(recorded.scenario, recorded.recording).tracker.targets
     with compiling():
         return replace(record, estimates=smooth(trace, targets, lag))
 

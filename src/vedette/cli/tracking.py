@@ -104,7 +104,7 @@ def track(
     identity = _check_output(formats or (), out, overwrite)
     recorded, warnings = read_recording(sensors, scans, truth, speed=speed, bad_rows=bad_rows, trust=trust)
     if smooth:
-        check_labels(recorded.scenario)
+        check_labels(recorded)
     if "clutter" in recorded.assumed and not calibrate:
         note("`--calibrate` estimates clutter, noise and detection from the same scans.")
     on_earth = [name for name in formats or () if name in ON_EARTH]
@@ -127,7 +127,7 @@ def track(
         joins = _print_tracks(record, recorded, scans, join)
         records, trajectories = {"tracks": record}, {}
         if trace is not None:
-            records["smoothed"] = smoothed_record(record, scenario, trace, lag)
+            records["smoothed"] = smoothed_record(record, recorded, trace, lag)
             trajectories = print_trajectories(records, joins, scenario)
         if folder is not None:
             for name, each in records.items():

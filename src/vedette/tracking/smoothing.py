@@ -31,7 +31,7 @@ class TraceEntry(NamedTuple):
 
 
 class _Scan(NamedTuple):
-    """A scan of which a smoother needs no more than this."""
+    """The parts of a scan that a smoother needs."""
 
     time: float  # s
     marginals: LMB  # of all labels
