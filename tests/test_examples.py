@@ -103,7 +103,6 @@ SHOWN = {
     "docs/scenarios.md": ["array([-90.])"],
     "docs/searches.md": ["of 65 joint actions evaluated"],
     "docs/signatures.md": ["500.", "7.07106781e+03"],
-    "docs/smoothing.md": ["filtered: 11.2 m", "smoothed: 6.8 m"],
     "docs/smoothing.md": ["filtered: position RMSE 1", "smoothed: position RMSE "],
     "docs/stonesoup.md": ["targets, ", "looks along 30 degrees; the ship is at 33"],
     "docs/target-classes.md": ["[-1.18  0.96]"],
