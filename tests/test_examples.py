@@ -103,6 +103,7 @@ SHOWN = {
     "docs/scenarios.md": ["array([-90.])"],
     "docs/searches.md": ["of 65 joint actions evaluated"],
     "docs/signatures.md": ["500.", "7.07106781e+03"],
+    "docs/smoothing.md": ["filtered: position RMSE 1", "smoothed: position RMSE "],
     "docs/stonesoup.md": ["targets, ", "looks along 30 degrees; the ship is at 33"],
     "docs/target-classes.md": ["[-1.18  0.96]"],
     "docs/tutorial.md": ["best: sensor 1 goes east and sensor 2 north", "Plan of jdm for 2 sensors"],

@@ -25,6 +25,7 @@ from vedette.cli.running import (
     unchanged_out,
 )
 from vedette.cli.scenario_files import write_text
+from vedette.cli.smoothing import check_labels, check_smoothing, print_trajectories, smoothed_record
 from vedette.internal.extras import without
 from vedette.internal.text import pluralise
 
@@ -35,6 +36,7 @@ if TYPE_CHECKING:
     from vedette.scenarios import Scenario
     from vedette.scenarios.from_recording import RecordingScenario
     from vedette.simulation.records import RunRecord
+    from vedette.tracking import TraceEntry
 
 Format = StrEnum("Format", ["csv", "geojson", "parquet", "czml", "mcap"])
 ON_EARTH = ("geojson", "czml", "mcap")
@@ -66,7 +68,13 @@ Formats = Annotated[
 JoinTracks = Annotated[
     bool, typer.Option("--join/--no-join", help="Join tracks across gaps, where they are probably of one target.")
 ]
-
+Smooth = Annotated[
+    bool, typer.Option("--smooth", help="Also write tracks in which each estimate uses the scans after it, too.")
+]
+Lag = Annotated[
+    float | None,
+    typer.Option("--lag", metavar="SECONDS", help="With --smooth: use later scans of this time only; default: all."),
+]
 Calibrate = Annotated[
     bool,
     typer.Option(
@@ -85,6 +93,8 @@ def track(
     overwrite: Overwrite = False,
     formats: Formats = None,
     join: JoinTracks = True,
+    smooth: Smooth = False,
+    lag: Lag = None,
     calibrate: Calibrate = False,
     speed: Speed = 10.0,
     bad_rows: BadRows = "refuse",
@@ -99,11 +109,14 @@ def track(
     from vedette.evaluation.runs import named_target_scores
     from vedette.scenarios.from_recording import scenario_from_recording
 
+    check_smoothing(smooth, lag)
     identity = _check_output(formats or (), out, overwrite)
     if partial_truth and truth is None:
         raise usage_error("expected with --truth, which names the reports", "--partial-truth")
     settings: dict[str, Any] = {"speed": speed, "bad_rows": bad_rows, "partial_truth": partial_truth}
     recorded, warnings = read_recording(sensors, scans, truth, trust=trust, **settings)
+    if smooth:
+        check_labels(recorded)
     if "clutter" in recorded.assumed and not calibrate:
         note("`--calibrate` estimates clutter, noise and detection from the same scans.")
     on_earth = [name for name in formats or () if name in ON_EARTH]
@@ -111,33 +124,41 @@ def track(
         raise usage_error(f"expected an origin in {sensors}, as {on_earth[0]} has degrees; got none", "--format")
     text, calibration = None, None
     with interruptible("nothing was written"):
-        record, fit = _tracked(recorded)
+        trace: list[TraceEntry] | None = [] if smooth else None
+        record, fit = _tracked(recorded, trace)
         if calibrate and (found := calibrate_doubtful(recorded, fit, sensors)):
             text, calibration = found
             recorded = scenario_from_recording(sensors, scans, truth, text=text, **settings)
-            record, fit = _tracked(recorded)
+            trace = None if trace is None else []
+            record, fit = _tracked(recorded, trace)
         scenario = recorded.scenario
         print_run(record, scenario, fit, len(warnings))
         folder = unchanged_out(out, overwrite, identity)
         written = [] if folder is None else _save(record, scenario, fit, folder, text, overwrite=overwrite)
     with interruptible("nothing was written") if folder is None else finishing(folder, "tracks and figures"):
         joins = _print_tracks(record, recorded, scans, join)
+        records, trajectories = {"tracks": record}, {}
+        if trace is not None:
+            records["smoothed"] = smoothed_record(record, recorded, trace, lag)
+            trajectories = print_trajectories(records, joins, scenario)
         if folder is not None:
-            written += _write_tracks(record, scenario, folder, formats, joins)
-            _draw(record, scenario, folder)
+            for name, each in records.items():
+                written += _write_tracks(each, scenario, folder, formats, joins, name)
+                _draw(each, scenario, folder, name)
     if folder is not None:
         echo(f"Wrote {folder}: {', '.join(_contents(folder, written))}")
     origin = {"assumptions": recorded.assumed, "skipped": recorded.recording.skipped, "warnings": warnings}
     targets = [{"name": name, **own._asdict()} for name, own in named_target_scores(record, scenario)]
-    more = {"targets": targets, "joins": [join._asdict() for join in joins], "calibration": calibration}
+    more: dict[str, Any] = {"targets": targets, "joins": [join._asdict() for join in joins], **trajectories}
+    more["calibration"] = calibration
     emit_json({**run_document(record, scenario, fit), **origin, **more, "folder": folder, "written": written})
 
 
-def _tracked(recorded: RecordingScenario) -> tuple[RunRecord, Fit]:
-    """Return the run of the tracker over all scans, and the fit of its model."""
+def _tracked(recorded: RecordingScenario, trace: list[TraceEntry] | None) -> tuple[RunRecord, Fit]:
+    """Return the run of the tracker over all scans, and the fit of its model. trace: see `track_recording`."""
     from vedette.evaluation.fit import fit_of_run
 
-    record = _run_tracker(recorded.scenario, recorded.recording)
+    record = _run_tracker(recorded.scenario, recorded.recording, trace)
     with compiling():
         return record, fit_of_run(record, recorded.scenario)
 
@@ -170,26 +191,26 @@ def _check_output(formats: Sequence[str], out: Path | None, overwrite: bool) -> 
     return check_out(out, overwrite)
 
 
-def _run_tracker(scenario: Scenario, recording: RecordedScans) -> RunRecord:
+def _run_tracker(scenario: Scenario, recording: RecordedScans, trace: list[TraceEntry] | None) -> RunRecord:
     """Run the tracker over all scans. Exit if the run stops early."""
     from vedette.evaluation.runs import track_recording
     from vedette.simulation.journal import RunInterrupted, RunStopped
 
     try:
         with compiling(), bar("scans", len(recording.times)) as progress:
-            return track_recording(scenario, recording, progress=progress)
+            return track_recording(scenario, recording, progress=progress, trace=trace)
     except (RunStopped, RunInterrupted) as error:
         end_stopped(error, "nothing was written")
 
 
 def _write_tracks(
-    record: RunRecord, scenario: Scenario, folder: Path, formats: Sequence[str] | None, joins: Sequence[Join]
+    record: RunRecord, scenario: Scenario, folder: Path, formats: Sequence[str] | None, joins: Sequence[Join], name: str
 ) -> list[Path]:
-    """Write the tracks in each format, and return their files."""
+    """Write the tracks in each format, in files of this name, and return the files."""
     from vedette.evaluation.track_table import table_of_run, write_tracks
 
     default_formats = ("csv", "geojson") if scenario.model.origin is not None else ("csv",)
-    written = [folder / "tracks" / f"tracks.{name}" for name in dict.fromkeys(formats or default_formats)]
+    written = [folder / "tracks" / f"{name}.{ending}" for ending in dict.fromkeys(formats or default_formats)]
     table = table_of_run(record, scenario, joins)
     for path in written:
         write_tracks(path, table)
@@ -234,10 +255,10 @@ def _describe_tracks(record: RunRecord) -> str:
     )
 
 
-def _draw(record: RunRecord, scenario: Scenario, out: Path) -> None:
+def _draw(record: RunRecord, scenario: Scenario, out: Path, name: str) -> None:
     if missing_package := without("vedette track --out: figures", "matplotlib"):
         note(missing_package)
         return
     from vedette.evaluation.figures import build_scene, save_figure, tracks_figure
 
-    save_figure(tracks_figure(record, scene=build_scene(scenario, record.planner)), out / "figures" / "tracks")
+    save_figure(tracks_figure(record, scene=build_scene(scenario, record.planner)), out / "figures" / name)

@@ -14,7 +14,7 @@ from vedette.evaluation.metrics.track_ospa import TrackSet, ospa2, ospa2_of_run
 from vedette.evaluation.metrics.tracked_fraction import TimeToTrack, TrackedFraction, targets_in_view
 from vedette.evaluation.metrics.trajectories import Continuity, continuity, continuity_of_run
 from vedette.evaluation.rewards import MeanRewards, mean_rewards
-from vedette.evaluation.runs import custom_metrics, measure_run, run_scenario, track_recording
+from vedette.evaluation.runs import custom_metrics, measure_run, run_scenario, track_recording, trajectory_errors
 from vedette.evaluation.statistics import PairedDifference, Summary, holm, paired_difference, summarise
 from vedette.evaluation.tables import decision_rows, strategy_csv, strategy_markdown, strategy_rows
 
@@ -64,4 +64,5 @@ __all__ = [
     "summarise",
     "targets_in_view",
     "track_recording",
+    "trajectory_errors",
 ]

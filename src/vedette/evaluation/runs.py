@@ -5,10 +5,13 @@ from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
-from vedette.evaluation.metrics.matching import near_targets
+import numpy as np
+
+from vedette.evaluation.metrics.matching import match_run, near_targets
 from vedette.evaluation.metrics.point_ospa import ospa_of_run
 from vedette.evaluation.metrics.run import Metric, RunMetrics, measure
 from vedette.evaluation.metrics.targets import TargetScore, target_scores
+from vedette.evaluation.metrics.track_ospa import ospa2_of_run
 from vedette.evaluation.recording_metadata import recording_metadata
 from vedette.kernels.base.types import HEIGHT, place_of
 from vedette.recorded import RecordedScans
@@ -23,6 +26,7 @@ from vedette.scenarios.sections.scoring import AnyMetric
 from vedette.simulation.journal import Score
 from vedette.simulation.loop import simulate
 from vedette.simulation.records import Measure, RunRecord
+from vedette.tracking import TraceEntry
 
 
 def run_scenario(
@@ -65,18 +69,20 @@ def track_recording(
     seed: int = 0,
     run: int = 0,
     progress: Callable[[int], None] | None = None,
+    trace: list[TraceEntry] | None = None,
 ) -> RunRecord:
     """Track the recorded scans of a scenario.
 
     Args:
         scenario: such as that of `vedette.scenarios.from_recording.scenario_from_recording`.
         recording: its scans. None: read from the file.
-        seed, run, progress: see `vedette.recorded.Tracking.run`.
+        seed, run, progress, trace: see `vedette.recorded.Tracking.run`.
 
     Raises:
         VedetteError: scans that are not recorded, or models and filters that do not support the request.
     """
-    return build_tracking(scenario, recording).run(build_score(scenario), seed=seed, run=run, progress=progress)
+    tracking = build_tracking(scenario, recording)
+    return tracking.run(build_score(scenario), seed=seed, run=run, progress=progress, trace=trace)
 
 
 def build_score(scenario: Scenario) -> Score | None:
@@ -104,10 +110,16 @@ def _build_metric(scenario: Scenario, section: AnyMetric) -> Measure:
 
 def measure_run(record: RunRecord, scenario: Scenario, custom: Sequence[Metric] = ()) -> RunMetrics:
     """Return all measures of a run by its scenario's cutoff, order, window and truth. Raises like `measure`."""
-    ospa = scenario.model.ospa
-    if ospa.truth == "partial":
-        record = replace(record, estimates=tuple(near_targets(record.truth, record.estimates, ospa.cutoff)))
+    ospa, record = scenario.model.ospa, _scored(record, scenario)
     return measure(record, cutoff=ospa.cutoff, order=ospa.order, window=ospa.window, custom=custom)
+
+
+def _scored(record: RunRecord, scenario: Scenario) -> RunRecord:
+    """Return the record with only the estimates that count (`ospa.truth`)."""
+    ospa = scenario.model.ospa
+    if ospa.truth == "complete":
+        return record
+    return replace(record, estimates=tuple(near_targets(record.truth, record.estimates, ospa.cutoff)))
 
 
 def named_target_scores(record: RunRecord, scenario: Scenario) -> list[tuple[str, TargetScore]]:
@@ -115,3 +127,19 @@ def named_target_scores(record: RunRecord, scenario: Scenario) -> list[tuple[str
     ospa, names = scenario.model.ospa, recording_metadata(record, scenario).names
     scores = target_scores(record, cutoff=ospa.cutoff, order=ospa.order)
     return [(names[own.target] if names else str(own.target + 1), own) for own in scores]
+
+
+def trajectory_errors(record: RunRecord, scenario: Scenario) -> dict[str, float]:
+    """Return the errors of a run's tracks over all scans, by the cutoff, order and window of its scenario.
+
+    `rmse_m` is the root mean square distance of the estimates matched with targets, NaN without any. `ospa2_m` is the
+    mean OSPA(2). Raises like `measure`.
+    """
+    ospa, record = scenario.model.ospa, _scored(record, scenario)
+    matching = match_run(record.truth, record.estimates, cutoff=ospa.cutoff, order=ospa.order)
+    distances = ospa2_of_run(record.truth, record.estimates, cutoff=ospa.cutoff, order=ospa.order, window=ospa.window)
+    squares = matching.distances**2
+    return {
+        "rmse_m": float(np.sqrt(squares.mean())) if len(squares) else float("nan"),
+        "ospa2_m": float(distances[:, 0].mean()),
+    }

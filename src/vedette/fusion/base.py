@@ -136,14 +136,14 @@ def all_valid(beliefs: Sequence[Any]) -> bool:
     return all(is_valid_lmb(belief.to_kernel()) for belief in beliefs)
 
 
-def _sizes(belief: LabelledDensity) -> tuple[int, ...]:
-    return belief.state_dim, *(column.shape[1] for column in belief.tracks.marks)
+def _sizes(belief: LabelledDensity) -> tuple[int, int]:
+    return belief.state_dim, belief.tracks.num_classes
 
 
 def _has_kernel_arrays(belief: Any) -> bool:
     """Return True if the arrays of an LMB have the types that kernels expect."""
     tracks, logits = belief.tracks, belief.existence_logit
-    columns = tracks.log_weights, tracks.means, tracks.covs, *tracks.marks
+    columns = tracks.log_weights, tracks.means, tracks.covs, tracks.marks
     arrays = tracks.labels, tracks.offsets, logits, *columns
     for array, (dtype, ndim) in zip(arrays, _FORMS, strict=True):
         if type(array) is not np.ndarray or array.dtype != dtype or array.ndim != ndim:

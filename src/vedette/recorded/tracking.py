@@ -12,7 +12,7 @@ from vedette.simulation.journal import Journal, Score
 from vedette.simulation.loop import FILTER, RunningTracker, sensor_streams
 from vedette.simulation.records import RunRecord
 from vedette.simulation.truth import Truth
-from vedette.tracking import Tracker
+from vedette.tracking import TraceEntry, Tracker
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -48,7 +48,13 @@ class Tracking:
         return replace(self, recording=self.recording.between(0.0, later), truth=self.truth.first(num))
 
     def run(
-        self, score: Score | None, *, seed: int = 0, run: int = 0, progress: Callable[[int], None] | None = None
+        self,
+        score: Score | None,
+        *,
+        seed: int = 0,
+        run: int = 0,
+        progress: Callable[[int], None] | None = None,
+        trace: list[TraceEntry] | None = None,
     ) -> RunRecord:
         """Track the targets. Raises `RunStopped` and `RunInterrupted` like `vedette.simulation.simulate`.
 
@@ -56,6 +62,7 @@ class Tracking:
             score: (num_scans, 3) OSPA of the estimates against the truth. None: NaN.
             seed, run: fix the random numbers of filters that draw.
             progress: called with the number of each instant after it.
+            trace: list to which each instant is added, for `vedette.tracking.smooth`.
         """
         recording, num_sensors = self.recording, len(self.tracker.sensors)
         journal = Journal(self.name, "recorded", seed, run, self.truth, num_sensors, recording.file)
@@ -66,8 +73,10 @@ class Tracking:
             )
             instants = zip(recording.times.tolist(), recording.scans, recording.poses, strict=True)
             for step, (time, scans, poses) in enumerate(instants, start=1):
-                _, info, estimate = running.step(step, scans, poses, time, journal.begin(step))
+                state, info, estimate = running.step(step, scans, poses, time, journal.begin(step))
                 journal.note(poses, np.zeros(num_sensors, np.bool_), info, estimate)
+                if trace is not None:
+                    trace.append(TraceEntry(time, state.fused, estimate))
                 if progress is not None:
                     progress(step)
 

@@ -1,4 +1,4 @@
-"""Trackers of all sensors: local filters with fusion, a central filter, a radio network. Late scans and snapshots."""
+"""Trackers of all sensors: local filters with fusion, a central filter, a radio network; late scans, smoothing."""
 
 from vedette.tracking.base import StageTimer, State, Tracker, TrackerInfo, failed_stage
 from vedette.tracking.belief_network import BeliefNetwork
@@ -15,6 +15,7 @@ from vedette.tracking.out_of_sequence import (
 )
 from vedette.tracking.program import ProgramFilter
 from vedette.tracking.scan_network import ScanNetwork
+from vedette.tracking.smoothing import FixedLagSmoother, TraceEntry, smooth
 from vedette.tracking.snapshots import load_snapshot, save_snapshot
 from vedette.tracking.undetected import UndetectedTargetTracker
 from vedette.tracking.views import ViewTracker
@@ -26,6 +27,7 @@ __all__ = [
     "Delay",
     "DelayedScanTracker",
     "Distributed",
+    "FixedLagSmoother",
     "Network",
     "OutOfSequenceInfo",
     "OutOfSequenceTracker",
@@ -36,6 +38,7 @@ __all__ = [
     "State",
     "Timeline",
     "TimelineEntry",
+    "TraceEntry",
     "Tracker",
     "TrackerInfo",
     "UndetectedTargetTracker",
@@ -43,4 +46,5 @@ __all__ = [
     "failed_stage",
     "load_snapshot",
     "save_snapshot",
+    "smooth",
 ]
