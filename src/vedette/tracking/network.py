@@ -155,8 +155,7 @@ def belief_parts(belief: Any) -> dict[bytes, int]:
     for (low, high), size, other in zip(pairwise(firsts.tolist()), sizes.tolist(), others, strict=True):
         start, end = tracks.offsets[low], tracks.offsets[high]
         track_arrays = tracks.labels[low:high], tracks.offsets[low:high] - start
-        *moments, marks = tracks.to_kernel().components
-        component_arrays = (array[start:end] for array in (*moments, *marks))
+        component_arrays = (array[start:end] for array in tracks.to_kernel().components)
         content = b"".join([other, *(array.tobytes() for array in (*track_arrays, *component_arrays))])
         parts[blake2b(content, digest_size=NUMBER_BYTES).digest()] = size
     return parts
