@@ -125,6 +125,7 @@ SHOWN = {
     "examples/own_reward.py": ["own: near the harbour  error near the harbour"],
     "examples/own_sensor.py": ["greatest difference between the two"],
     "examples/recorded_scans.py": ["3 ships at the end"],
+    "examples/smoothed_tracks.py": ["filtered          position error 14", "smoothed          position error  7"],
     "examples/time_differences.py": ["from 40 s on: mean error 5.3 m, 3.00 targets estimated of 3"],
 }
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import csv
-import json
 from pathlib import Path
 
 import pytest
@@ -56,43 +55,6 @@ def test_tracks_are_joined_across_gaps_unless_that_is_switched_off(place: Path) 
     joined, apart = tables
     assert [row["label"] for row in joined] == [row["label"] for row in apart] == [row["track"] for row in apart]
     assert len({row["track"] for row in joined}) == len({row["label"] for row in joined}) - 3
-
-
-def test_smoothed_tracks_stand_beside_the_filtered(place: Path) -> None:
-    given = ("scans.csv", "--sensors", "radars.yaml", "--truth", "truth.csv", "--smooth", "--json")
-    result = call(*given, "--out", "out")
-    assert result.exit_code == 0, result.output
-    errors = json.loads(result.stdout)["trajectories"]
-    assert list(errors) == ["filtered", "smoothed"]
-    assert list(errors["filtered"]) == list(errors["smoothed"]) == ["rmse_m", "ospa2_m"]
-    assert errors["smoothed"]["rmse_m"] < errors["filtered"]["rmse_m"]
-    assert errors["smoothed"]["ospa2_m"] < errors["filtered"]["ospa2_m"]
-    names = {path.name for path in (place / "out/tracks").iterdir()}
-    assert names == {f"{name}.{ending}" for name in ("tracks", "smoothed") for ending in ("csv", "geojson")}
-    assert (place / "out/figures/smoothed.png").exists()
-    lagged = json.loads(call(*given, "--lag", "1000").stdout)
-    assert lagged["trajectories"] == errors
-    assert json.loads(call(*given, "--lag", "10").stdout)["trajectories"]["filtered"] == errors["filtered"]
-
-
-def test_smoothing_without_meaning_is_refused_by_its_option(place: Path) -> None:
-    given = ("scans.csv", "--sensors", "radars.yaml")
-    for words, expected in (
-        (("--smooth", "--lag", "0"), "--lag: expected a time above 0 s; got 0"),
-        (("--smooth", "--lag", "nan"), "--lag: expected a time above 0 s; got nan"),
-        (("--lag", "5"), "--lag: expected with --smooth, as no other tracks have a lag"),
-    ):
-        result = call(*given, *words)
-        assert (result.exit_code, expected in result.stderr) == (2, True), result.stderr
-    rows = (place / "scans.csv").read_text("utf-8").splitlines(keepends=True)
-    (place / "scans.csv").write_text("".join(row for row in rows if "boat" not in row), "utf-8")
-    sensors = (place / "radars.yaml").read_text("utf-8").replace("  - {name: boat, position: [0.0, 0.0]}\n", "")
-    site = "{existence: 0.1, mean: [0.0, 0.0, 0.0, 0.0], std: [3000.0, 3000.0, 5.0, 5.0]}"
-    (place / "radars.yaml").write_text(
-        f"{sensors}filter: {{kind: phd}}\nfusion: {{kind: none}}\nbirth: {{sites: [{site}]}}\n", "utf-8"
-    )
-    result = call(*given, "--smooth")
-    assert "--smooth: expected a filter whose targets have labels, such as delta_glmb; got phd" in result.stderr
 
 
 def test_tables_are_written_before_the_joins(place: Path, monkeypatch: pytest.MonkeyPatch) -> None:

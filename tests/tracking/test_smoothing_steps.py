@@ -11,6 +11,7 @@ import pytest
 from vedette import models
 from vedette.densities import LMB, Estimate, best_estimate
 from vedette.densities.tracks import TrackTable
+from vedette.errors import InputError
 from vedette.filters import SequentialFactoredFilter
 from vedette.kernels.base.types import Floats
 from vedette.kernels.gaussian.marks import marks_of
@@ -197,3 +198,30 @@ def test_tracks_begin_and_end_when_later_scans_say_so() -> None:
     trace = [TraceEntry(float(k), *pair) for k, pair in enumerate(zip(lmbs, estimates, strict=True))]
     found = smooth(trace, target_model())
     assert [estimate.num_targets for estimate in found] == [1, 1, 0, 0]
+
+
+def test_empty_scans_and_classes_are_kept() -> None:
+    """The class is that of the last estimate, also where a scan has no estimate."""
+    marks = marks_of(np.log([[0.3, 0.7]]))
+    lmb = LMB(TrackTable(LABEL, np.array([0, 1]), np.zeros(1), np.zeros((1, 4)), np.eye(4)[None], marks), np.ones(1))
+    estimates = [Estimate.empty(4), best_estimate(lmb, 2), Estimate.empty(4)]
+    trace = [TraceEntry(float(k), lmb, estimate) for k, estimate in enumerate(estimates)]
+    found = smooth(trace, target_model())
+    assert [estimate.num_targets for estimate in found] == [1, 1, 0]
+    np.testing.assert_allclose(found[0].class_probs, [[0.3, 0.7]], rtol=1e-12)
+    nothing = LMB.empty(4)
+    assert [len(each) for each in smooth([TraceEntry(0.0, nothing, Estimate.empty(4))] * 2, target_model())] == [0, 0]
+
+
+def test_densities_of_other_targets_are_refused() -> None:
+    plane = LMB.from_bernoullis(LABEL, [0.9], np.zeros((1, 2)), np.eye(2)[np.newaxis])
+    with pytest.raises(
+        InputError, match=r"density: expected states and modes of targets.motion, of dimension 4.*got 2"
+    ):
+        smooth([TraceEntry(0.0, plane, reported(plane))], target_model())
+    turning = mixture([1.0], np.zeros((1, 4)), np.eye(4)[np.newaxis], [1])
+    with pytest.raises(InputError, match="modes up to 1"):
+        smooth([TraceEntry(0.0, turning, Estimate.empty(4))], target_model())
+    other = reported(still(0.9).with_labels(np.array([[2, 0]])))
+    with pytest.raises(InputError, match=r"estimate\.labels: expected labels of the density; got .*2, 0"):
+        smooth([TraceEntry(0.0, still(0.9), other)], target_model())

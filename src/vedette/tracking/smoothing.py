@@ -6,7 +6,7 @@ C.-J. Kim, "Dynamic Linear Models with Markov-Switching", Journal of Econometric
 
 from collections import deque
 from collections.abc import Iterable
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -75,15 +75,14 @@ class FixedLagSmoother:
     def add(self, time: float, density: LabelledDensity, estimate: Estimate) -> tuple[Estimate, ...]:
         """Add a scan, and return the smoothed estimates of the scans that are final now, in order of time.
 
-        Raises `InputError` for a density without labels, or a time before the last.
+        Raises `InputError` for a density without labels or of other targets, an estimate of labels that the density
+        does not have, or a time before the last.
         """
         now = real("time", time)
-        if not isinstance(density, LabelledDensity):
-            raise reject("density", "one with labels, a GLMB, an LMB or a FactoredGLMB", type(density).__name__)
         if self._scans and now < self._scans[-1].time:
             last = self._scans[-1].time
             raise InputError(f"time: expected one from that of the last scan on, {last:g} s; got {now:g}")
-        self._scans.append(_Scan(now, as_lmb(density, max_components=_MAX_COMPONENTS), estimate))
+        self._scans.append(_Scan(now, _marginals(density, estimate, self.targets), estimate))
         if self.lag_s is None:
             return ()
         return self._take(sum(scan.time + self.lag_s <= now for scan in self._scans))
@@ -121,11 +120,25 @@ def smooth(trace: Iterable[TraceEntry], targets: TargetModel, lag_s: float | Non
     return (*early, *smoother.finish())
 
 
+def _marginals(density: LabelledDensity, estimate: Estimate, targets: TargetModel) -> LMB:
+    """Return the marginal densities of all labels. Raises `InputError` as `FixedLagSmoother.add` does."""
+    if not isinstance(density, LabelledDensity):
+        raise reject("density", "one with labels, a GLMB, an LMB or a FactoredGLMB", type(density).__name__)
+    if density.state_dim != targets.state_dim or density.tracks.modes.max(initial=0) >= _num_modes(targets.motion):
+        got = f"{density.state_dim} and modes up to {density.tracks.modes.max(initial=0)}"
+        raise reject("density", f"states and modes of targets.motion, of dimension {targets.state_dim}", got)
+    lmb = as_lmb(density, max_components=_MAX_COMPONENTS)
+    unknown = estimate.labels[places_of(estimate.labels, lmb.tracks.labels) < 0]
+    if len(unknown):
+        raise reject("estimate.labels", "labels of the density", unknown.tolist())
+    return lmb
+
+
 def _smoothed_scan(scan: _Scan, targets: TargetModel, later: _Tracks | None) -> _Tracks:
     """Return the tracks of a scan given all scans after it: those of `later` that it has, and those that end here."""
     time, marginals, estimate = scan
     existence = marginals.existence if later is None else _smoothed_existence(scan, targets, later)
-    found = []
+    found: list[tuple[Any, ...]] = []
     if later is not None:
         places = places_of(later.labels, marginals.tracks.labels)
         kept = np.flatnonzero(places >= 0)
@@ -139,8 +152,9 @@ def _smoothed_scan(scan: _Scan, targets: TargetModel, later: _Tracks | None) -> 
     ends = existence[places] >= _LEAST_SHARE * marginals.existence[places]
     if later is not None:
         ends &= places_of(estimate.labels, later.labels) < 0
-    own = estimate.means, estimate.covs, _padded(estimate.mode_probs, targets.motion), estimate.class_probs
-    found.append((estimate.labels[ends], existence[places[ends]], *(part[ends] for part in own)))
+    ended = estimate.means, estimate.covs, _padded(estimate.mode_probs, targets.motion), estimate.class_probs
+    found.append((estimate.labels[ends], existence[places[ends]], *(part[ends] for part in ended)))
+    found = [part for part in found if len(part[0])] or found[-1:]
     labels, exist, means, covs, modes, classes = (np.concatenate(parts) for parts in zip(*found, strict=True))
     order = np.lexsort(labels.T[::-1])
     smoothed = SmoothedTracks(means[order], covs[order], modes[order])
@@ -166,8 +180,11 @@ def _smoothed_existence(scan: _Scan, targets: TargetModel, later: _Tracks) -> Fl
 
 def _padded(mode_probs: Floats, motion: MotionModel) -> Floats:
     """Return the probabilities of modes with a column for each mode, one without modes."""
-    num_modes = len(motion.motions) if isinstance(motion, Modes) else 1
-    return np.pad(mode_probs, ((0, 0), (0, num_modes - mode_probs.shape[1])))
+    return np.pad(mode_probs, ((0, 0), (0, _num_modes(motion) - mode_probs.shape[1])))
+
+
+def _num_modes(motion: MotionModel) -> int:
+    return len(motion.motions) if isinstance(motion, Modes) else 1
 
 
 def _estimate_of(tracks: _Tracks) -> Estimate:
