@@ -21,7 +21,7 @@ import yaml
 from stiff_motion import Scene, written
 
 from vedette.calibration import calibrate
-from vedette.evaluation.metrics import ospa
+from vedette.evaluation.metrics.point_ospa import ospa
 from vedette.evaluation.runs import track_recording
 from vedette.internal.unit_warnings import suppress_unit_warnings
 from vedette.kernels.base.types import Floats

@@ -16,6 +16,7 @@ import argparse
 import csv
 import math
 import time
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -25,12 +26,13 @@ from scipy.optimize import linear_sum_assignment
 
 from vedette import models
 from vedette.densities.estimates import Estimate, best_estimate
-from vedette.evaluation.metrics import ospa
-from vedette.filters import FactoredGlmbFilter, Limits
+from vedette.evaluation.metrics.point_ospa import ospa
+from vedette.filters import FactoredGlmbFilter, Limits, LmbFilter
 from vedette.kernels.base.types import Floats
 
 NEAR = 5.0  # times the noise, within which an estimate is of a target
 END = 60  # scan from which a target of `ends` is gone
+NUM_SCANS, WARM_UP = 24, 6  # of `time`
 
 
 def matched(estimate: Estimate, truth: Floats, reach: float) -> list[tuple[int, int]]:
@@ -117,37 +119,61 @@ def ends(numbers: range) -> None:
         print(f"{name:24} keeps its label for {interval(values)} scans, at most {max(values):.0f}")
 
 
+def crossing(
+    num: int, motion: models.MotionModel, at_sites: bool
+) -> tuple[models.TargetModel, models.SensorModel, list[Floats]]:
+    """Return targets, a sensor and scans of this number of targets, on straight courses at one density.
+
+    at_sites: True for births where the targets are, False for births anywhere.
+    """
+    half, rng = 200.0 * math.sqrt(num), np.random.default_rng(1)
+    begin = np.column_stack([rng.uniform(-0.9 * half, 0.9 * half, (num, 2)), rng.normal(0.0, 8.0, (num, 2))])
+    ways = np.pad(begin[:, 2:], ((0, 0), (0, 2)))
+    states = begin + np.arange(NUM_SCANS)[:, np.newaxis, np.newaxis] * ways
+    scans = [own[rng.random(num) < 0.9, :2] for own in states]
+    scans = [scan + 3.0 * rng.standard_normal(scan.shape) for scan in scans]
+    region = models.Region(-half, half, -half, half)
+    sensor = models.SensorModel(
+        models.position(),
+        models.constant_noise([3.0, 3.0]),
+        models.constant_detection(0.9),
+        models.region_clutter(1.0, region, "position"),
+    )
+    empty = np.zeros((NUM_SCANS, num), bool)
+    targets = targets_of(Scene(states, empty, empty, scans, region, 3.0, 10.0, 0.9, 1.0), motion)
+    if at_sites:
+        covs = np.tile(np.diag([36.0, 36.0, 100.0, 100.0]), (num, 1, 1))
+        birth = models.BirthModel(np.full(num, 0.99), states[0], covs, steps=frozenset({1}))
+        targets = replace(targets, birth=birth)
+    return targets, sensor, scans
+
+
+def time_of_scan(kind: Any, num: int, motion: models.MotionModel) -> float:
+    """Return the CPU time of a scan once all targets are tracked, ms: the least of several medians."""
+    targets, sensor, scans = crossing(num, motion, kind is LmbFilter)
+    tracker, medians = kind(targets, sensor, Limits()), list[float]()
+    for _ in range(max(2, 60 // num)):
+        belief, spent, rng = tracker.initial(), list[float](), np.random.default_rng(1)
+        for step, scan in enumerate(scans, 1):
+            start = time.process_time()
+            belief, _ = tracker.step(belief, scan, np.zeros(3), 1.0, step, rng=rng)
+            spent.append(1e3 * (time.process_time() - start))
+        medians.append(float(np.median(spent[WARM_UP:])))
+    return min(medians)
+
+
 def costs(numbers: tuple[int, ...]) -> None:
-    """Print the CPU time of a scan by the numbers of targets and of modes, without clutter."""
-    for num in numbers:
-        half, base = 200.0 * math.sqrt(num), 0.0
-        region, rng = models.Region(-half, half, -half, half), np.random.default_rng(1)
-        begin = np.column_stack([rng.uniform(-0.9 * half, 0.9 * half, (num, 2)), rng.normal(0.0, 8.0, (num, 2))])
-        states = begin[np.newaxis] + np.arange(12.0)[:, np.newaxis, np.newaxis] * np.pad(begin[:, 2:], ((0, 0), (0, 2)))
-        scans = [own[rng.random(num) < 0.9, :2] for own in states]
-        scans = [scan + 3.0 * rng.standard_normal(scan.shape) for scan in scans]
-        empty = np.zeros((12, num), bool)
-        own = Scene(states, empty, empty, scans, region, 3.0, 10.0, 0.9, 1.0)
-        every = modes_of(10.0)
-        for count in (1, 2, 3, 5):
-            motion: models.MotionModel = every.motions[0]
-            if count > 1:
-                motion = models.Modes(every.motions[:count], [40.0, 8.0, 8.0, 8.0, 40.0][:count])
-            sensor = models.SensorModel(
-                models.position(),
-                models.constant_noise([3.0, 3.0]),
-                models.constant_detection(0.9),
-                models.region_clutter(1.0, region, "position"),
-            )
-            tracker = FactoredGlmbFilter(targets_of(own, motion), sensor, Limits())
-            belief, spent = tracker.initial(), []
-            for step, scan in enumerate(scans, 1):
-                start = time.process_time()
-                belief, _ = tracker.step(belief, scan, np.zeros(3), 1.0, step, rng=rng)
-                spent.append(1e3 * (time.process_time() - start))
-            value = float(np.median(spent[4:]))
-            base = value if count == 1 else base
-            print(f"{num:5} targets, {count} modes: {value:8.2f} ms a scan, x {value / base:.2f}", flush=True)
+    """Print the CPU time of a scan by filter and the numbers of targets and of modes."""
+    every, stays = modes_of(10.0), [40.0, 8.0, 8.0, 8.0, 40.0]
+    several = [models.Modes(every.motions[:count], stays[:count]) for count in (2, 3, 5)]
+    print("| filter | targets | one motion, ms | two modes, ms, ratio | three | five |")
+    print("| --- | ---: | ---: | ---: | ---: | ---: |")
+    for kind in (LmbFilter, FactoredGlmbFilter):
+        for num in numbers:
+            base = time_of_scan(kind, num, every.motions[0])
+            times = [time_of_scan(kind, num, motion) for motion in several]
+            shown = " | ".join(f"{value:.2f}, {value / base:.2f}" for value in times)
+            print(f"| {kind.__name__} | {num} | {base:.2f} | {shown} |", flush=True)
 
 
 def speeds(folder: Path) -> None:

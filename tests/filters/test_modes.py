@@ -28,7 +28,12 @@ from vedette.filters import (
     MultiSensorLmbFilter,
     PhdFilter,
 )
-from vedette.kernels.gaussian.modes import mode_transitions, predicted_intensity
+from vedette.kernels.base.types import Tracks
+from vedette.kernels.gaussian.components import components_of
+from vedette.kernels.gaussian.distances import reduction_bound
+from vedette.kernels.gaussian.marks import marks_of
+from vedette.kernels.gaussian.modes import LOG_LEAST, branched_tracks, mode_transitions, predicted_intensity
+from vedette.kernels.gaussian.reduction import make_reduction_work
 from vedette.tracking.births import births_from_scans
 
 pytestmark = pytest.mark.lanes
@@ -315,3 +320,39 @@ def test_a_light_component_of_many_targets_is_kept_as_that_of_one():
             scaled = intensity._replace(log_weights=intensity.log_weights + math.log(scale))
             moved = predicted_intensity(scaled, motion, 1.0)
             assert np.count_nonzero(moved.means[:, 0] > 1e3 * num - 500.0) == 2
+
+
+def tracks_of(weights: list[float], modes: list[int]) -> Tracks:
+    """One track of components at rest at the origin."""
+    num = len(weights)
+    marks = marks_of(modes=np.array(modes))
+    components = components_of(np.log(weights), np.zeros((num, 4)), np.tile(np.eye(4), (num, 1, 1)), marks)
+    return Tracks(np.zeros((1, 2), np.int64), np.array([0, num]), components)
+
+
+def test_a_mode_that_is_rarely_entered_stays_possible_at_any_rate_of_scans():
+    modes = models.Modes((models.constant_velocity(1.0), models.constant_velocity(9.0)), (1e4, 1e4))
+    motion = models.motion_of_filter(modes, models.constant_survival(1.0))
+    moved, _ = branched_tracks(tracks_of([1.0], [0]), motion, 1e-3, LOG_LEAST)
+    order = np.argsort(moved.components.marks[:, 0])
+    np.testing.assert_allclose(np.exp(moved.components.log_weights[order]), expm(modes.rates * 1e-3)[0], rtol=1e-9)
+
+
+def test_light_branches_are_dropped_and_their_weight_is_shared():
+    modes = models.Modes((models.constant_velocity(1.0), models.constant_velocity(9.0)), (10.0, 10.0))
+    motion = models.motion_of_filter(modes, models.constant_survival(1.0))
+    shares = expm(modes.rates)[0]
+    for light, kept in ((1e-5, 1.0), (1e-2, 1.0 - 1e-2)):
+        moved, _ = branched_tracks(tracks_of([1.0 - light, light], [0, 1]), motion, 1.0, LOG_LEAST)
+        order = np.argsort(moved.components.marks[:, 0])
+        wanted = kept * shares + (1.0 - kept) * shares[::-1]
+        np.testing.assert_allclose(np.exp(moved.components.log_weights[order]), wanted, rtol=1e-9)
+
+
+def test_a_reduced_mixture_that_lacks_a_mode_is_as_far_as_its_weight():
+    both = tracks_of([0.9, 0.1], [0, 1]).components
+    one = tracks_of([1.0], [0]).components
+    work = make_reduction_work(2, both)
+    assert reduction_bound(both, 2, one, 0, 1, work) == pytest.approx(0.2)
+    same = tracks_of([0.9, 0.1], [0, 0]).components
+    assert reduction_bound(same, 2, one, 0, 1, work) == pytest.approx(0.0, abs=1e-6)

@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from vedette.kernels.base.compile import kernel
+from vedette.kernels.base.compile import borrowing, inlined, kernel
 from vedette.kernels.base.types import Floats, common_components, place_of
 from vedette.models import kinematics, manoeuvres
 from vedette.models.arguments import reject
@@ -22,7 +22,7 @@ _HEAD = 6  # numbers of a block before the places
 
 def _part(function: ModelFunction) -> Any:
     """Return a model function as a kernel, so that it can be compiled into others."""
-    return kernel(getattr(function, "py_func", function))
+    return borrowing(getattr(function, "py_func", function))
 
 
 def _parts(function: str) -> list[Any]:
@@ -47,7 +47,7 @@ _cv_q, _height_q, _ct_q, _walk_q, _wander_q, _turn_q, _acceleration_q = _parts("
 _continuous_q = _part(kinematics._cv_continuous_noise)
 
 
-@kernel
+@borrowing
 def _move(kind: int, state: Floats, dt: float, params: Floats, out: Floats) -> None:
     if kind == 0:
         _cv_f(state, dt, params, out)
@@ -65,7 +65,7 @@ def _move(kind: int, state: Floats, dt: float, params: Floats, out: Floats) -> N
         _acceleration_f(state, dt, params, out)
 
 
-@kernel
+@borrowing
 def _slope(kind: int, state: Floats, dt: float, params: Floats, out: Floats) -> None:
     if kind == 0:
         _cv_j(state, dt, params, out)
@@ -83,7 +83,7 @@ def _slope(kind: int, state: Floats, dt: float, params: Floats, out: Floats) -> 
         _acceleration_j(state, dt, params, out)
 
 
-@kernel
+@borrowing
 def _disturb(kind: int, state: Floats, dt: float, params: Floats, out: Floats) -> None:
     if kind == 0:
         _cv_q(state, dt, params, out)
@@ -131,20 +131,19 @@ def _taken(state: Floats, places: Floats) -> Floats:
     return out
 
 
-@kernel
-def _is_alone(block: _Block, state: Floats) -> bool:
-    """Return True if the motion of a block is that of all components in their order, as in most modes."""
-    is_whole = block.share == 1.0 and len(block.places) == len(state)
-    for i in range(len(block.places)):
-        is_whole = is_whole and block.places[i] == i
-    return is_whole
+@inlined
+def _is_alone(params: Floats, dim: int) -> bool:
+    """Return True if the only motion is that of all components of the state in their order, as in most modes."""
+    num_in_order = 0
+    for i in range(dim if params[4] == dim else 0):
+        num_in_order += params[_HEAD + i] == i
+    return bool(params[0] == 1.0 and num_in_order == dim)
 
 
 @model_function("transition")
 def _transition(state: Floats, dt: float, params: Floats, out: Floats) -> None:
-    only = _block(params, 0)
-    if _is_alone(only, state):
-        _move(only.kind, state, dt, only.transition_params, out)
+    if _is_alone(params, len(state)):
+        _move(int(params[2]), state, dt, params[_HEAD + len(state) :], out)
         return
     out[:] = 0.0
     at = 0
@@ -162,9 +161,8 @@ def _transition(state: Floats, dt: float, params: Floats, out: Floats) -> None:
 
 @model_function("transition_jacobian")
 def _jacobian(state: Floats, dt: float, params: Floats, out: Floats) -> None:
-    only = _block(params, 0)
-    if _is_alone(only, state):
-        _slope(only.kind, state, dt, only.transition_params, out)
+    if _is_alone(params, len(state)):
+        _slope(int(params[2]), state, dt, params[_HEAD + len(state) :], out)
         return
     out[:, :] = 0.0
     at = 0
@@ -185,9 +183,8 @@ def _jacobian(state: Floats, dt: float, params: Floats, out: Floats) -> None:
 @model_function("process_noise_cov")
 def _noise(state: Floats, dt: float, params: Floats, out: Floats) -> None:
     """Mean of the noise of all motions, with the spread of the states to which they lead."""
-    only = _block(params, 0)
-    if _is_alone(only, state):
-        _disturb(only.noise, state, dt, only.noise_params, out)
+    if _is_alone(params, len(state)):
+        _disturb(int(params[3]), state, dt, params[_HEAD + len(state) + int(params[5]) :], out)
         return
     out[:, :] = 0.0
     at, mean = 0, np.zeros(len(state))

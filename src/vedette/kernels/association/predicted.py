@@ -16,7 +16,7 @@ from vedette.kernels.gaussian.components import borrowed_components, components_
 from vedette.kernels.gaussian.innovation import Innovation, expect, make_innovation
 from vedette.kernels.gaussian.linalg import log_add, log_or_minus_inf
 from vedette.kernels.gaussian.marks import detection_factor
-from vedette.kernels.gaussian.modes import branched_tracks
+from vedette.kernels.gaussian.modes import LOG_LEAST, branched_tracks
 from vedette.kernels.gaussian.prediction import predict
 from vedette.kernels.gaussian.row_noise import bring_noise
 from vedette.kernels.gaussian.scratch import Scratch, make_scratch
@@ -160,7 +160,7 @@ def standing_rows_of_scan(tracks: Tracks, scan: ScanInput, sensor: Sensor) -> Ro
 @kernel
 def branched_rows(tracks: Tracks, scan: ScanInput, motion: Motion, meas_dim: int) -> Rows:
     """Return the rows of a scan, without `expect_rows`, of targets that change their mode of motion."""
-    moved, log_dead = branched_tracks(tracks, motion, scan.dt)
+    moved, log_dead = branched_tracks(tracks, motion, scan.dt, LOG_LEAST)
     sites, num = scan.birth.tracks, len(tracks.labels)
     num_components = len(moved.components.log_weights) + len(sites.components.log_weights)
     rows = make_rows(num + len(sites.labels), num_components, moved.components, meas_dim)

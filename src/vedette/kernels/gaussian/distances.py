@@ -9,6 +9,7 @@ from vedette.kernels.base.arrays import grown_ints
 from vedette.kernels.base.compile import borrowing, inlined, kernel
 from vedette.kernels.base.types import Floats, Ints, Mixture
 from vedette.kernels.gaussian.linalg import cholesky, log_det_from_factor, log_sum, solve_lower
+from vedette.kernels.gaussian.marks import mode_of
 from vedette.kernels.gaussian.reduction import ReductionWork
 
 _SLACK = 1.0 + 1e-9  # for what rounding does to a distance
@@ -105,7 +106,7 @@ def reduction_bound(
 ) -> float:
     """Upper bound on the L1 distance of the first `width` components, of any scale, from `reduced[first:last]`.
 
-    Each component counts for the nearest of the reduced ones: with weights w_c, v_k and k(c) it is
+    Each component counts for the nearest of the reduced ones of its mode: with weights w_c, v_k and k(c) it is
 
         sum_c w_c |N_c - M_k(c)| + sum_k |v_k - sum of the w_c with k(c) = k|.
     """
@@ -120,10 +121,15 @@ def reduction_bound(
         if weight == 0.0:
             continue
         for k in range(num):
+            if mode_of(mixture.marks, c) != mode_of(reduced.marks, first + k):
+                continue
             mean, cov = reduced.means[first + k], reduced.covs[first + k]
             apart = l1_bound(mixture.means[c], mixture.covs[c], mean, cov, work.factor, work.difference)
             if apart < least:
                 nearest, least = k, apart
+        if least == math.inf:  # none of its mode is left
+            error += weight
+            continue
         left[nearest] -= weight
         error += weight * least
     for k in range(num):
