@@ -39,7 +39,7 @@ POSES = np.zeros((2, 3))
 def transition(dt: float) -> tuple[Floats, Floats]:
     """F, and G with Q = G G', of constant velocity with process noise 1 m/s^1.5 (paper-notes 1)."""
     gain = np.array([[dt**2 / 2.0], [dt]])
-    return np.kron([[1.0, dt], [0.0, 1.0]], np.eye(2)), np.kron(gain, np.eye(2))
+    return np.asarray(np.kron([[1.0, dt], [0.0, 1.0]], np.eye(2))), np.asarray(np.kron(gain, np.eye(2)))
 
 
 def batch(times: Floats, rows: Sequence[Sequence[Floats | None]]) -> tuple[Floats, Floats]:
