@@ -59,8 +59,9 @@ def tests(purpose: str, *places: str) -> Stage:
     return Stage(purpose, python("pytest", "-q", "--durations=10", *places))
 
 
-# In the order in which they start. The tests of the library and of decisions compile nearly all kernels, while the
-# other side is busy with what needs none of them; what starts processes begins when the kernels are there.
+# In the order in which they start. The tests of the library compile most kernels, while the other side is busy with
+# what needs none of them; what starts processes begins when the kernels are there. The longest start first, so that
+# none runs alone at the end.
 STAGES = {
     "tests-library": tests(
         "models, densities, fusion and all below",
@@ -73,10 +74,10 @@ STAGES = {
     # NumPy checks every index of the same tests in `jit-off`; this also checks those of the compiled code. An index is
     # out of bounds however well the code is optimised, and little optimisation compiles faster.
     "bounds": lane("kernels with bounds checks", "bounds", by_default=False, NUMBA_BOUNDSCHECK="1", NUMBA_OPT="1"),
-    "tests-filters": tests("filters and trackers", *FILTERS),
-    "tests-control": tests("decisions: futures, rewards, searches, planners", *CONTROL),
     "tests-program": tests("command line, scenarios, reports, examples", *PROGRAM),
+    "tests-filters": tests("filters and trackers", *FILTERS),
     "tests-campaigns": tests("campaigns, fuzzers, extensions, the project itself", *CAMPAIGNS),
+    "tests-control": tests("decisions: futures, rewards, searches, planners", *CONTROL),
     "docs": Stage("the site of the documentation, without warnings", [sys.executable, "tools/docs.py"]),
     "format": Stage("the layout of the source", python("ruff", "format", "--check", "--output-format=concise", ".")),
     "prose": Stage("turns of phrase and lengths of guides", [sys.executable, "tools/prose.py"]),
