@@ -12,7 +12,9 @@ from scipy.linalg import expm
 
 from vedette import models
 from vedette.errors import InputError
+from vedette.evaluation.observation_history import ObservationHistory
 from vedette.filters import Limits, LmbFilter
+from vedette.kernels.gaussian.components import components_of
 from vedette.models.correlation import discounted, independent_share
 from vedette.models.functions import model_function
 from vedette.simulation.true_sensors import ErrorMemory, TrueSensor
@@ -171,3 +173,16 @@ def test_a_filter_keeps_the_probability_that_its_target_is_hidden():
         weights = np.exp(belief.tracks.log_weights)
         hidden = weights[belief.tracks.modes == 1].sum() / weights.sum()
         assert hidden == pytest.approx(probs[1], abs=1e-5)
+
+
+def test_a_joined_track_of_a_target_that_may_hide_moves_by_its_mixed_motion():
+    motion, _ = models.hiding_modes(models.constant_velocity(1.0), {"camera": (6.0, 2.0)})
+    birth = models.BirthModel(np.array([0.5]), np.zeros((1, 4)), np.eye(4)[None])
+    targets = models.TargetModel(motion, models.constant_survival(0.99), birth)
+    scanned, times = np.ones((3, 1), np.bool_), np.array([0.0, 1.0, 2.0])
+    history = ObservationHistory(targets, (KNOWN,), times, np.zeros((3, 1, 3)), scanned, 0.0)
+    means = np.array([[0.0, 0.0, 5.0, 0.0], [9.0, 9.0, 0.0, 1.0]])
+    before = components_of(np.zeros(2), means, np.array([np.eye(4)] * 2))
+    after = history.predict(before, 0, 2)
+    np.testing.assert_allclose(after.means, [[10.0, 0.0, 5.0, 0.0], [9.0, 11.0, 0.0, 1.0]], atol=1e-12)
+    np.testing.assert_allclose(np.exp(after.log_weights), 0.99**2)

@@ -15,7 +15,7 @@ from vedette.kernels.gaussian.modes import predicted_intensity
 from vedette.kernels.steps.undetected import WIDE
 from vedette.models import SensorModel, TargetModel
 from vedette.models.arguments import probability
-from vedette.models.modes import motion_of_filter
+from vedette.models.motion import kernel_motion
 
 # Number of estimates at which a label counts as a birth, and the shape of the prior of the number of births.
 _MIN_ESTIMATES, _SHAPE = 3, 0.5
@@ -55,8 +55,8 @@ class ObservationHistory:
         return float(self.times[scan] - self.times[scan - 1]) if scan else 1.0
 
     def predict(self, mixture: Mixture, first: int, last: int) -> Mixture:
-        """Return a mixture at scan `first`, after survival and motion to scan `last`."""
-        motion = motion_of_filter(self.targets.motion, self.targets.survival)
+        """Return a mixture at scan `first`, after survival and motion to scan `last`, of modes their mixed motion."""
+        motion = kernel_motion(self.targets.motion, self.targets.survival)
         for scan in range(first + 1, last + 1):
             mixture = predicted_intensity(mixture, motion, self.scan_interval(scan))
         return mixture
